@@ -1,0 +1,1 @@
+"""Friction of drive axes identified without mass and without acceleration, and explained."""

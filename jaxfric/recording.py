@@ -1,0 +1,148 @@
+"""One log of one axis, as arrays: the only thing that the rest of the library reads."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from .units import SI
+
+
+def _array(value):
+    return None if value is None else jnp.asarray(value)
+
+
+def _signal(value):
+    """A floating-point array; whole numbers (encoder counts) become the default float."""
+    if value is None:
+        return None
+    value = jnp.asarray(value)
+    return value if jnp.issubdtype(value.dtype, jnp.floating) else value.astype(float)
+
+
+class Recording(eqx.Module):
+    """A log of motion and force of one axis; a pytree, so that logs stack into batches.
+
+    **Arguments:** (shapes for one recording; a batch made by [`stack`][] has a leading axis)
+
+    - `time`: s, shape `(N,)`, increasing inside a segment.
+    - `force`: measured or commanded actuator force, N (N·m, A, V, …), shape `(N,)`.
+    - `position`: m (rad), shape `(N,)`, or `None`.
+    - `velocity`: m/s (rad/s), shape `(N,)`, or `None`: then it is derived from the position.
+    - `mask`: which samples are valid, shape `(N,)`; all of them by default.
+    - `segment`: whole numbers that change where the record is interrupted (the clock restarts,
+      samples are missing), shape `(N,)`, numbered from 0 in order; one segment by default.
+    - `channels`: further signals by role (`reference`, `load`, `temperature`, …), each `(N,)`.
+    - `units`: names of the force and the position unit, `{"force": "N", "position": "m"}`.
+    - `source`: where the recording comes from, for messages.
+    - `num_segments`: a static bound on the number of segments; counted where `None`.
+
+    **Raises:** `ValueError` if the shapes differ or if neither position nor velocity is given.
+    """
+
+    time: Float[Array, " N"] = eqx.field(converter=_signal)
+    force: Float[Array, " N"] = eqx.field(converter=_signal)
+    position: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
+    velocity: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
+    mask: Bool[Array, " N"] | None = eqx.field(converter=_array, default=None)
+    segment: Int[Array, " N"] | None = eqx.field(converter=_array, default=None)
+    channels: dict[str, Float[Array, " N"]] = eqx.field(default_factory=dict)
+    units: tuple[tuple[str, str], ...] = eqx.field(
+        static=True, default=(), converter=lambda units: tuple(sorted((SI | dict(units)).items()))
+    )
+    source: str = eqx.field(static=True, default="")
+    num_segments: int | None = eqx.field(static=True, default=None)
+
+    def __post_init__(self):
+        if self.mask is None:
+            self.mask = jnp.ones(self.time.shape, bool)
+        if self.segment is None:
+            self.segment = jnp.zeros(self.time.shape, jnp.int32)
+            self.num_segments = 1
+        elif self.num_segments is None:
+            if isinstance(self.segment, jax.core.Tracer):
+                raise ValueError(
+                    "Recording(segment=...) inside jax.jit needs num_segments=, because the "
+                    "number of segments decides the shapes of the compiled program."
+                )
+            self.num_segments = int(np.max(np.asarray(self.segment), initial=0)) + 1
+        self.channels = {name: _signal(value) for name, value in self.channels.items()}
+
+    def __check_init__(self):
+        if self.position is None and self.velocity is None:
+            raise ValueError(
+                "A Recording needs position or velocity beside time and force; "
+                f"{self.source or 'this one'} has neither."
+            )
+        signals = {"force": self.force, "position": self.position, "velocity": self.velocity}
+        signals |= {"mask": self.mask, "segment": self.segment, **self.channels}
+        for name, signal in signals.items():
+            if signal is not None and signal.shape != self.time.shape:
+                raise ValueError(
+                    f"Recording signals must have one shape: time has {self.time.shape}, "
+                    f"{name} has {signal.shape}."
+                )
+
+    @property
+    def unit_names(self) -> dict[str, str]:
+        """The names of the force and the position unit."""
+        return dict(self.units)
+
+    @property
+    def num_samples(self) -> int:
+        """Samples along the time axis, padding included."""
+        return self.time.shape[-1]
+
+
+def pad(recording: Recording, length: int) -> Recording:
+    """A recording lengthened with masked samples, so that recordings of unequal length stack.
+
+    **Arguments:** `recording`, signals of shape `(N,)`; `length`, at least `N`.
+
+    **Raises:** `ValueError` if `length` is below `N`.
+    """
+    extra = length - recording.num_samples
+    if extra < 0:
+        raise ValueError(f"Cannot pad {recording.num_samples} samples to {length}.")
+    if extra == 0:
+        return recording
+    padded = jax.tree.map(lambda x: jnp.pad(x, (0, extra), mode="edge"), recording)
+    mask = jnp.pad(recording.mask, (0, extra), constant_values=False)
+    return eqx.tree_at(lambda r: r.mask, padded, mask)
+
+
+def stack(recordings: Sequence[Recording]) -> Recording:
+    """Recordings as one batch: every signal gains a leading axis, shape `(B, N)`.
+
+    Shorter recordings are padded with masked samples to the longest. Signals that not every
+    recording has are an error, since one compiled program serves the whole batch.
+
+    **Raises:** `ValueError` if the list is empty or the recordings differ in signals or units.
+    """
+    if not recordings:
+        raise ValueError("stack() needs at least one recording.")
+    first = recordings[0]
+    for i, other in enumerate(recordings):
+        if _kinds(other) != _kinds(first):
+            raise ValueError(
+                f"Recordings of one batch must have the same signals and units; number {i} "
+                f"({other.source or 'unnamed'}) has {_kinds(other)}, number 0 has {_kinds(first)}."
+            )
+    length = max(recording.num_samples for recording in recordings)
+    segments = max(recording.num_segments or 1 for recording in recordings)
+    leaves = [jax.tree.leaves(pad(recording, length)) for recording in recordings]
+    structure = jax.tree.structure(_anonymous(first, segments))
+    return jax.tree.unflatten(structure, [jnp.stack(column) for column in zip(*leaves, strict=True)])
+
+
+def _kinds(recording: Recording) -> Mapping[str, object]:
+    present = [n for n in ("position", "velocity") if getattr(recording, n) is not None]
+    return {"signals": (*present, *sorted(recording.channels)), "units": recording.unit_names}
+
+
+def _anonymous(recording: Recording, segments: int) -> Recording:
+    return dataclasses.replace(recording, source="", num_segments=segments)

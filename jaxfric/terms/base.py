@@ -1,0 +1,327 @@
+"""What a term is: columns of a regression, written once, for one sample.
+
+An axis obeys u = Σ_j (f0_j + g_jᵀ α_j): the actuator force is a sum of terms. A term's nonlinear
+parameters β are its pytree leaves; its affine parameters α belong to nobody until they are solved
+for (`jaxfric.reduced`), and then live beside the terms in a [`Model`][jaxfric.models.Model].
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..recording import Recording
+from ..units import DIMENSIONLESS, Dimension
+
+
+class Sample(eqx.Module):
+    """One sample of a recording as a law of physics sees it: every field is a scalar.
+
+    `time` s; `position` m; `velocity` m/s; `channels`: further signals by role. In a batch of
+    samples (inside the library) every field has the same leading shape.
+    """
+
+    time: Float[Array, ""]
+    position: Float[Array, ""]
+    velocity: Float[Array, ""]
+    channels: dict[str, Float[Array, ""]] = eqx.field(default_factory=dict)
+
+
+def samples(recording: Recording) -> Sample:
+    """The samples of a recording, each field of shape `(N,)`.
+
+    Without a recorded position the field is NaN, so that a term that needs it fails loudly.
+    """
+    absent = jnp.full_like(recording.time, jnp.nan)
+    position = absent if recording.position is None else recording.position
+    if recording.velocity is None:
+        raise ValueError(
+            "This recording has no velocity yet: pass it through jaxfric.signals.prepare first."
+        )
+    return Sample(recording.time, position, recording.velocity, dict(recording.channels))
+
+
+class Scales(NamedTuple):
+    """What a recording says about magnitudes; the source of every default bound.
+
+    `slowest`: the smallest speed resolved as slip, m/s. `fastest`: the 98 % quantile of the
+    speed, m/s. `low`, `high`: the range of the position, m. `force`: root mean square, N.
+    `duration`: s. `interval`: the typical sampling interval, s. All scalars.
+    """
+
+    slowest: Float[Array, ""]
+    fastest: Float[Array, ""]
+    low: Float[Array, ""]
+    high: Float[Array, ""]
+    force: Float[Array, ""]
+    start: Float[Array, ""]
+    duration: Float[Array, ""]
+    interval: Float[Array, ""]
+
+
+class Parameter(NamedTuple):
+    """A parameter's name, dimension and, where it is searched for, its compact set.
+
+    `bounds` maps the [`Scales`][] of a recording to `(lower, upper)`, the set B of Kim, Kim & Ha
+    (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio.
+    """
+
+    name: str
+    dimension: Dimension = DIMENSIONLESS
+    bounds: Callable[[Scales], tuple[Array, Array]] | None = None
+    logarithmic: bool = True
+
+
+class AbstractTerm(eqx.Module):
+    """A summand of the axis equation u = Σ_j (f0_j + g_jᵀ α_j).
+
+    Terms add (`+`), and [`Directional`][] gives each direction of motion its own parameters.
+    To write a term of your own, derive from [`AbstractLaw`][].
+    """
+
+    @property
+    @abstractmethod
+    def affine(self) -> tuple[Parameter, ...]:
+        """Names and dimensions of the affine parameters α, one for each column."""
+
+    @property
+    @abstractmethod
+    def nonlinear(self) -> tuple[Parameter, ...]:
+        """Names, dimensions and bounds of the nonlinear parameters β."""
+
+    @property
+    @abstractmethod
+    def coordinates(self) -> frozenset[str]:
+        """The signals that the columns are functions of.
+
+        `{"velocity"}` alone means that acceleration is orthogonal to the columns (Lemma 1 of
+        Kim, Kim & Ha 2004), so that neither mass nor acceleration is needed to identify them.
+        """
+
+    @abstractmethod
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        """The regressors g, one column for each affine parameter, shape `(N, p)`."""
+
+    @abstractmethod
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        """Quantities whose time derivative adds to the columns, shape `(N, p)`.
+
+        The derivative is never taken on the data: the projection puts it on its kernel.
+        """
+
+    @abstractmethod
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        """The known part f0 of the term, N, shape `(N,)`."""
+
+    @abstractmethod
+    def beta(self) -> Float[Array, " d"]:
+        """The nonlinear parameters as one vector, shape `(d,)`; NaN where not yet known."""
+
+    @abstractmethod
+    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractTerm":
+        """The same term with other nonlinear parameters, `beta` of shape `(d,)`."""
+
+    def __add__(self, other: "AbstractTerm") -> "Sum":
+        return Sum(_summands(self) + _summands(other))
+
+
+class AbstractLaw(AbstractTerm):
+    """A law of physics written for one sample; this class batches it over the recording.
+
+    A concrete law names its affine parameters in `affine`, gives `law(sample)`, a tuple with one
+    number for each of them, and lists in `nonlinear` the fields that are nonlinear parameters.
+    """
+
+    coordinates: ClassVar[frozenset[str]] = frozenset({"velocity"})  # type: ignore[misc]
+    nonlinear: ClassVar[tuple[Parameter, ...]] = ()  # type: ignore[misc]
+
+    @abstractmethod
+    def law(self, sample: Sample) -> tuple[Float[Array, ""], ...]:
+        """The columns at one sample."""
+
+    def impulse(self, sample: Sample) -> tuple[Float[Array, ""], ...]:
+        """The momentum at one sample; zero but for terms with acceleration in them."""
+        return tuple(jnp.zeros_like(sample.velocity) for _ in self.affine)
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return _batched(self.law, recording)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return _batched(self.impulse, recording)
+
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        return jnp.zeros_like(recording.time)
+
+    def beta(self) -> Float[Array, " d"]:
+        return _vector([getattr(self, parameter.name) for parameter in self.nonlinear])
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractLaw":
+        if not self.nonlinear:
+            return self
+        names = [parameter.name for parameter in self.nonlinear]
+        return eqx.tree_at(
+            lambda term: [getattr(term, name) for name in names], self, list(beta)
+        )
+
+
+class Sum(AbstractTerm):
+    """A sum of terms; its parameters are those of the summands, in their order."""
+
+    terms: tuple[AbstractTerm, ...]
+
+    @property
+    def affine(self) -> tuple[Parameter, ...]:
+        return _unique([p for term in self.terms for p in term.affine])
+
+    @property
+    def nonlinear(self) -> tuple[Parameter, ...]:
+        return _unique([p for term in self.terms for p in term.nonlinear])
+
+    @property
+    def coordinates(self) -> frozenset[str]:
+        return frozenset().union(*(term.coordinates for term in self.terms))
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return jnp.concatenate([term.columns(recording) for term in self.terms], axis=-1)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return jnp.concatenate([term.momentum(recording) for term in self.terms], axis=-1)
+
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        return sum((term.offset(recording) for term in self.terms), jnp.zeros_like(recording.time))
+
+    def beta(self) -> Float[Array, " d"]:
+        return jnp.concatenate([term.beta() for term in self.terms])
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "Sum":
+        counts = [len(term.nonlinear) for term in self.terms]
+        return Sum(
+            tuple(t.with_beta(b) for t, b in zip(self.terms, _split(beta, counts), strict=True))
+        )
+
+
+class Directional(AbstractTerm):
+    """A term with parameters of its own for each direction of motion.
+
+    g = [1(v > 0) g(v; β⁺), 1(v < 0) g(v; β⁻)], names with `+` and `-` appended. No sample lies on
+    both sides, so that problem (L) separates (Kim, Kim & Ha 2004, eqs. 24 and 30).
+    """
+
+    positive: AbstractTerm
+    negative: AbstractTerm
+
+    def __init__(self, term: AbstractTerm, negative: AbstractTerm | None = None):
+        self.positive = term
+        self.negative = term if negative is None else negative
+
+    @property
+    def affine(self) -> tuple[Parameter, ...]:
+        return _signed(self.positive.affine, "+") + _signed(self.negative.affine, "-")
+
+    @property
+    def nonlinear(self) -> tuple[Parameter, ...]:
+        return _signed(self.positive.nonlinear, "+") + _signed(self.negative.nonlinear, "-")
+
+    @property
+    def coordinates(self) -> frozenset[str]:
+        return self.positive.coordinates | {"velocity"}
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return self._sides(
+            recording, self.positive.columns(recording), self.negative.columns(recording)
+        )
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return self._sides(
+            recording, self.positive.momentum(recording), self.negative.momentum(recording)
+        )
+
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        v = recording.velocity
+        positive, negative = self.positive.offset(recording), self.negative.offset(recording)
+        return jnp.where(v > 0, positive, jnp.where(v < 0, negative, jnp.zeros_like(v)))
+
+    def beta(self) -> Float[Array, " d"]:
+        return jnp.concatenate([self.positive.beta(), self.negative.beta()])
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "Directional":
+        positive, negative = _split(
+            beta, [len(self.positive.nonlinear), len(self.negative.nonlinear)]
+        )
+        return Directional(self.positive.with_beta(positive), self.negative.with_beta(negative))
+
+    def _sides(self, recording, positive, negative):
+        v = recording.velocity[:, None]
+        return jnp.concatenate(
+            [
+                jnp.where(v > 0, positive, jnp.zeros_like(positive)),
+                jnp.where(v < 0, negative, jnp.zeros_like(negative)),
+            ],
+            axis=-1,
+        )
+
+
+def summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
+    """The leaves of a sum, in order; a term that is no sum is its own only summand."""
+    return tuple(leaf for part in _summands(term) for leaf in _expanded(part))
+
+
+def _expanded(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
+    return summands(term) if isinstance(term, Sum) else (term,)
+
+
+def _summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
+    return term.terms if isinstance(term, Sum) else (term,)
+
+
+def bounds(
+    term: AbstractTerm, scales: Scales, given: Mapping[str, tuple[float, float]] | None = None
+) -> Float[Array, "2 d"]:
+    """The compact set B: lower and upper bounds of the nonlinear parameters, shape `(2, d)`.
+
+    A bound `given` under a parameter's name (with or without its direction sign) wins over the
+    one that the recording suggests.
+    """
+    given = given or {}
+    pairs = []
+    for parameter in term.nonlinear:
+        own = given.get(parameter.name, given.get(parameter.name.rstrip("+-")))
+        pair = own if own is not None else parameter.bounds(scales)
+        pairs.append(jnp.stack([jnp.asarray(limit, scales.fastest.dtype) for limit in pair]))
+    return jnp.stack(pairs, axis=1) if pairs else jnp.zeros((2, 0), scales.fastest.dtype)
+
+
+def _batched(body, recording: Recording) -> Float[Array, "N p"]:
+    return jax.vmap(lambda sample: _vector(body(sample)))(samples(recording))
+
+
+def _vector(values) -> Float[Array, " k"]:
+    return jnp.stack([jnp.asarray(value) for value in values]) if len(values) else jnp.zeros((0,))
+
+
+def _split(vector, counts):
+    ends = [sum(counts[: i + 1]) for i in range(len(counts))]
+    return [vector[end - count : end] for end, count in zip(ends, counts, strict=True)]
+
+
+def _signed(parameters, sign):
+    return tuple(parameter._replace(name=parameter.name + sign) for parameter in parameters)
+
+
+def _unique(parameters):
+    """Parameters with the second and later bearers of a name numbered from 2."""
+    seen: dict[str, int] = {}
+    unique = []
+    for parameter in parameters:
+        count = seen[parameter.name] = seen.get(parameter.name, 0) + 1
+        unique.append(parameter if count == 1 else parameter._replace(name=_numbered(parameter.name, count)))
+    return tuple(unique)
+
+
+def _numbered(name: str, count: int) -> str:
+    stem = name.rstrip("+-")
+    return f"{stem}_{count}{name[len(stem):]}"

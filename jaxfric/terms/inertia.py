@@ -1,0 +1,30 @@
+"""Forces that come with acceleration, and the constant one."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ..units import FORCE, INERTIA
+from .base import AbstractLaw, Parameter, Sample
+
+
+class Inertia(AbstractLaw):
+    """Force that accelerates the moving mass: u = d(M v)/dt (Newton's second law)."""
+
+    affine: ClassVar = (Parameter("inertia", INERTIA),)
+    coordinates: ClassVar = frozenset({"acceleration"})
+
+    def law(self, sample: Sample):
+        return (jnp.zeros_like(sample.velocity),)
+
+    def impulse(self, sample: Sample):
+        return (sample.velocity,)
+
+
+class Offset(AbstractLaw):
+    """Constant force: u = F₀ (weight of a vertical axis, amplifier offset)."""
+
+    affine: ClassVar = (Parameter("offset", FORCE),)
+
+    def law(self, sample: Sample):
+        return (jnp.ones_like(sample.velocity),)
