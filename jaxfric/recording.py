@@ -16,6 +16,10 @@ def _array(value):
     return None if value is None else jnp.asarray(value)
 
 
+def _whole(value):
+    return None if value is None else jnp.asarray(value).astype(jnp.int32)
+
+
 def _signal(value):
     """A floating-point array; whole numbers (encoder counts) become the default float."""
     if value is None:
@@ -49,7 +53,7 @@ class Recording(eqx.Module):
     position: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
     velocity: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
     mask: Bool[Array, " N"] | None = eqx.field(converter=_array, default=None)
-    segment: Int[Array, " N"] | None = eqx.field(converter=_array, default=None)
+    segment: Int[Array, " N"] | None = eqx.field(converter=_whole, default=None)
     channels: dict[str, Float[Array, " N"]] = eqx.field(default_factory=dict)
     units: tuple[tuple[str, str], ...] = eqx.field(
         static=True, default=(), converter=lambda units: tuple(sorted((SI | dict(units)).items()))

@@ -1,0 +1,245 @@
+"""Velocity without phase lag, what counts as slip, and windows with equal end velocities."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from .recording import Recording
+from .terms.base import Scales
+
+# Half-widths, in samples, that the choice of the smoothing derivative runs over: steps of about
+# √2, which changes the noise of the derivative by √2³ = 2.8, from the central difference up.
+HALF_WIDTHS = (2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)
+# Inside jax.jit the width is data while the loop length is not, so the ladder ends earlier there.
+TRACED_REACH = 64
+# Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
+# worth of the friction curve; it also bounds the dynamic range that a velocity grid has to cover.
+SLIP_SHARE = 0.006
+# Four standard deviations: one sample of noise in 16,000 passes for slip.
+SLIP_DEVIATIONS = 4.0
+# An interval this many times the typical one is an interruption, not jitter of the clock.
+GAP_FACTOR = 5.0
+
+
+def kernel(tau: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """The smooth compact kernel φ(τ) = (1 − τ²)⁴ for |τ| < 1, else 0 (Messenger & Bortz 2021)."""
+    return jnp.maximum(1 - tau**2, 0.0) ** 4
+
+
+def kernel_slope(tau: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """dφ/dτ of [`kernel`][]."""
+    return -8 * tau * jnp.maximum(1 - tau**2, 0.0) ** 3
+
+
+def interval(recording: Recording) -> Float[Array, ""]:
+    """The typical sampling interval: the median over the valid steps, s."""
+    steps = jnp.where(_linked(recording), jnp.diff(recording.time), jnp.nan)
+    return jnp.nanmedian(steps)
+
+
+def continuous(recording: Recording, typical: Float[Array, ""]) -> Bool[Array, " M"]:
+    """Whether sample i and i + 1 belong together, shape `(N - 1,)`: same segment, no gap."""
+    steps = jnp.diff(recording.time)
+    return _linked(recording) & (steps > 0) & (steps <= GAP_FACTOR * typical)
+
+
+def _linked(recording: Recording) -> Bool[Array, " M"]:
+    mask, segment = recording.mask, recording.segment
+    return mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
+
+
+def local_quadratic(
+    recording: Recording, signal: Float[Array, " N"], half_width: Float[Array, ""], reach: int
+) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """Level and slope of a signal by local quadratic regression, without phase lag.
+
+    At every sample a parabola is fitted to the valid samples of its segment nearer than
+    `half_width` in time, weighted by [`kernel`][]: the clock may be irregular. (Savitzky & Golay
+    1964, with a tapered weight.)
+
+    **Arguments:** `signal`, shape `(N,)`; `half_width`, s; `reach`, the number of samples to each
+    side that are looked at.
+
+    **Returns:** level and slope, both `(N,)`; zero slope where fewer than three samples are near.
+    """
+    time, valid, segment = recording.time, recording.mask, recording.segment
+    padded = [
+        jnp.pad(x, reach, mode="edge") for x in (time, jnp.where(valid, signal, 0.0), segment)
+    ]
+    present = jnp.pad(valid, reach)
+    size = time.shape[0]
+
+    def add(sums, start):
+        t, x, s = (jax.lax.dynamic_slice_in_dim(p, start, size) for p in padded)
+        tau = (t - time) / half_width
+        near = jax.lax.dynamic_slice_in_dim(present, start, size) & (s == segment)
+        weight = jnp.where(near, kernel(tau), 0.0)
+        dx = x - signal
+        terms = (weight, weight * tau, weight * tau**2, weight * tau**3, weight * tau**4)
+        terms += (weight * dx, weight * tau * dx, weight * tau**2 * dx)
+        return tuple(a + b for a, b in zip(sums, terms, strict=True)), None
+
+    zeros = tuple(jnp.zeros_like(time) for _ in range(8))
+    (s0, s1, s2, s3, s4, x0, x1, x2), _ = jax.lax.scan(add, zeros, jnp.arange(2 * reach + 1))
+    minor0, minor1, minor2 = s2 * s4 - s3**2, s1 * s4 - s2 * s3, s1 * s3 - s2**2
+    determinant = s0 * minor0 - s1 * minor1 + s2 * minor2
+    enough = determinant > 1e-9 * (s0**3 + jnp.finfo(time.dtype).tiny)
+    safe = jnp.where(enough, determinant, 1.0)
+    level = (x0 * minor0 - x1 * minor1 + x2 * minor2) / safe
+    slope = (-x0 * minor1 + x1 * (s0 * s4 - s2**2) - x2 * (s0 * s3 - s1 * s2)) / safe
+    return (
+        signal + jnp.where(enough, level, 0.0),
+        jnp.where(enough, slope, 0.0) / half_width,
+    )
+
+
+def white_noise(recording: Recording, signal: Float[Array, " N"]) -> Float[Array, ""]:
+    """Standard deviation of the white part of a signal, rounding to encoder counts included.
+
+    From the mean magnitude of fourth differences (von Neumann's idea: a smooth signal has none),
+    over the samples where the signal moves, since at rest an encoder shows no noise.
+    """
+    weights = jnp.asarray([1.0, -4.0, 6.0, -4.0, 1.0], signal.dtype)
+    together = continuous(recording, interval(recording))
+    size = signal.shape[0] - 4
+    pieces = jnp.stack([signal[i : i + size] for i in range(5)])
+    whole = jnp.all(jnp.stack([together[i : i + size] for i in range(4)]), axis=0)
+    used = whole & (pieces[0] != pieces[4])
+    magnitude = jnp.where(used, jnp.abs(weights @ pieces), 0.0)
+    mean = jnp.sum(magnitude) / jnp.maximum(jnp.sum(used), 1).astype(signal.dtype)
+    # E|z| = σ √(2/π); the squared weights add to 70.
+    return mean * jnp.sqrt(jnp.pi / 2 / 70)
+
+
+def _derivative_weights(half_width: int, dtype) -> Float[Array, " K"]:
+    """The weights of the local quadratic slope on a regular clock of one second."""
+    offsets = jnp.arange(-half_width, half_width + 1, dtype=dtype)
+    weight = kernel(offsets / half_width) * offsets
+    return weight / jnp.sum(weight * offsets)
+
+
+def _ladder(recording: Recording, reach: int) -> tuple[int, ...]:
+    longest = max(2, recording.num_samples // 8)
+    return tuple(k for k in HALF_WIDTHS if k <= min(reach, longest))
+
+
+def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Float[Array, ""]:
+    """The half-width, in samples, that makes the derivative of the position most accurate.
+
+    Minimises Stein's unbiased estimate of the mean-square error of the slope: for each width h of
+    the ladder, mean (v_h − v_0)² + 2 σ² ⟨k_h, k_0⟩, with v_0 the unbiased central difference and
+    σ the white noise of the position (encoder resolution included).
+    """
+    position = recording.position - jnp.mean(recording.position)
+    size, dtype = position.shape[0], position.dtype
+    noise = white_noise(recording, position)
+    links = jnp.pad(jnp.cumsum(continuous(recording, interval(recording))), (1, 0))
+    length = size + 2 * reach
+    spectrum = jnp.fft.rfft(position, length)
+
+    def slope(weights):
+        transform = jnp.fft.rfft(weights[::-1], length)
+        return jnp.fft.irfft(spectrum * transform, length)
+
+    first = _derivative_weights(2, dtype)
+    reference = slope(first)[2 : 2 + size]
+    risks = []
+    for k in _ladder(recording, reach):
+        weights = _derivative_weights(k, dtype)
+        whole = jnp.pad(links[2 * k :] - links[: size - 2 * k] == 2 * k, k)
+        error = jnp.where(whole, slope(weights)[k : k + size] - reference, 0.0)
+        count = jnp.sum(whole)
+        mean = jnp.sum(error**2) / jnp.maximum(count, 1).astype(dtype)
+        shared = jnp.sum(weights[k - 2 : k + 3] * first)
+        risks.append(jnp.where(count > 0, mean + 2 * noise**2 * shared, jnp.inf))
+    return jnp.asarray(_ladder(recording, reach), dtype)[jnp.argmin(jnp.stack(risks))]
+
+
+_choose = eqx.filter_jit(choose_half_width)
+_quadratic = eqx.filter_jit(local_quadratic)
+
+
+def derivative(
+    recording: Recording, signal: Float[Array, " N"], half_width: int
+) -> Float[Array, " N"]:
+    """Zero-phase smoothing derivative of a signal, its unit per second, shape `(N,)`.
+
+    **Arguments:** `signal`, `(N,)`; `half_width`, in samples of the typical interval.
+    """
+    return _quadratic(recording, signal, half_width * interval(recording), half_width)[1]
+
+
+def prepare(recording: Recording, half_width: int | None = None) -> Recording:
+    """A recording with a velocity and without values that cannot be computed with.
+
+    A recorded velocity is kept. Else the velocity is the zero-phase smoothing derivative of the
+    position, its width chosen from resolution and noise ([`choose_half_width`][]) or given in
+    samples. Samples that are not finite but valid by their mask stay: `identify` reports them.
+    """
+    recording = jax.tree.map(lambda x: x, recording)
+    if recording.velocity is not None:
+        return recording
+    if half_width is not None:
+        width, reach = jnp.asarray(half_width, recording.time.dtype), half_width
+    elif isinstance(recording.position, jax.core.Tracer):
+        width, reach = choose_half_width(recording, TRACED_REACH), TRACED_REACH
+    else:
+        width = _choose(recording)
+        reach = int(width)
+    velocity = _quadratic(recording, recording.position, width * interval(recording), reach)[1]
+    return dataclasses.replace(recording, velocity=velocity)
+
+
+def velocity_noise(recording: Recording) -> Float[Array, ""]:
+    """Standard deviation of the white part of the velocity, m/s."""
+    return white_noise(recording, recording.velocity)
+
+
+def scales(recording: Recording) -> Scales:
+    """Magnitudes of a prepared recording, from which bounds and thresholds are derived."""
+    valid = recording.mask
+    speed = jnp.where(valid, jnp.abs(recording.velocity), jnp.nan)
+    fastest = jnp.nanquantile(speed, 0.98)
+    slowest = jnp.maximum(SLIP_DEVIATIONS * velocity_noise(recording), SLIP_SHARE * fastest)
+    position = recording.velocity if recording.position is None else recording.position
+    inside = jnp.where(valid, position, jnp.nan)
+    time = jnp.where(valid, recording.time, jnp.nan)
+    count = jnp.maximum(jnp.sum(valid), 1).astype(speed.dtype)
+    force = jnp.sqrt(jnp.sum(jnp.where(valid, recording.force, 0.0) ** 2) / count)
+    start, end = jnp.nanmin(time), jnp.nanmax(time)
+    low, high = jnp.nanmin(inside), jnp.nanmax(inside)
+    return Scales(slowest, fastest, low, high, force, start, end - start, interval(recording))
+
+
+def counter_velocity(
+    counts: Float[Array, " N"], clock: Float[Array, " N"], resolution: float, tick: float = 1.0
+) -> Float[Array, " N"]:
+    """Velocity by the M/T method: counts between two pulses over the clock time between them.
+
+    **Arguments:** `counts`, accumulated encoder counts at the last pulse before each sample,
+    shape `(N,)`; `clock`, timer reading at that pulse; `resolution`, m per count; `tick`, s per
+    unit of `clock`.
+
+    **Returns:** velocity, m/s, shape `(N,)`; zero while no pulse arrives. The value is the mean
+    over the pulse interval, as in Kim, Kim & Ha (2004), section IV.
+    """
+    elapsed = jnp.diff(clock, prepend=clock[:1]) * tick
+    moved = jnp.diff(counts, prepend=counts[:1]) * resolution
+    fresh = elapsed > 0
+    velocity = jnp.where(fresh, moved / jnp.where(fresh, elapsed, 1.0), 0.0)
+    return velocity.at[0].set(velocity[1])
+
+
+def kernel_half_width(recording: Recording) -> int:
+    """Half-width, in samples, of the weak form's kernel for a recording.
+
+    Long beside the smoothing of the velocity, so that this does not matter, and a sixteenth of
+    the typical slip stretch at most, so that few rows are lost at reversals; inside jit, where
+    the recording has no values yet, 24 samples.
+    """
+    if isinstance(recording.time, jax.core.Tracer):
+        return 24
+    return 24
