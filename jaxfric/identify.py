@@ -11,7 +11,8 @@ from . import reduced, signals, uncertainty
 from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
 from .recording import Recording
-from .terms.base import AbstractTerm, Directional, Sum, bounds as term_bounds
+from .search import search
+from .terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from .terms.inertia import Inertia
 from .uncertainty import Estimate
 from .units import spell
@@ -124,12 +125,13 @@ def identify(
     batched = recording.time.ndim == 2
     prepared = _prepare_batch(recording) if batched else signals.prepare(recording)
     _check(term, projection, prepared)
-    if projection is None:
-        projection = choose_projection(term, prepared)
-    width = projection.half_width if isinstance(projection, WeakForm) else _width(prepared)
-    limits = {name: tuple(map(float, pair)) for name, pair in (bounds or {}).items()}
+    width = _width(projection, prepared)
+    limits = tuple(sorted((name, tuple(map(float, pair))) for name, pair in (bounds or {}).items()))
     solve = _identify_batch if batched else _identify
-    found = solve(term, prepared, projection, width, tuple(sorted(limits.items())), grid)
+    first = projection or (WeakForm(width) if _beyond_velocity(term) else ClosedWindows())
+    found = solve(term, prepared, first, width, limits, grid)
+    if projection is None and first != WeakForm(width) and _too_open(found):
+        found = solve(term, prepared, WeakForm(width), width, limits, grid)
     if throw:
         raise_unless_successful(found)
     return found
@@ -148,24 +150,15 @@ def result_names() -> tuple[str, ...]:
     return tuple(Result._name_to_item)
 
 
-def choose_projection(term: AbstractTerm, recording: Recording) -> AbstractProjection:
-    """The projection that fits the terms and, outside of jit, the recording."""
-    if _beyond_velocity(term):
-        return WeakForm(_width(recording))
-    if isinstance(recording.time, jax.core.Tracer) or recording.time.ndim == 2:
-        return ClosedWindows()
-    covered = float(_covered(recording))
-    return ClosedWindows() if covered >= LEAST_COVERED else WeakForm(_width(recording))
+def _too_open(found: Identified) -> bool:
+    """Whether closed windows leave out too much of a recording that is not traced or a batch."""
+    known = not isinstance(found.covered, jax.core.Tracer) and jnp.ndim(found.covered) == 0
+    return known and float(found.covered) < LEAST_COVERED
 
 
-@eqx.filter_jit
-def _covered(recording):
-    return ClosedWindows().rows(recording).covered
-
-
-def _width(recording: Recording) -> int:
-    """Half-width of the weak form's kernel, samples: see [`signals.kernel_half_width`][]."""
-    return signals.kernel_half_width(recording)
+def _width(projection: AbstractProjection | None, recording: Recording) -> int:
+    given = isinstance(projection, WeakForm)
+    return projection.half_width if given else signals.kernel_half_width(recording)
 
 
 def _structure(model) -> AbstractTerm:
@@ -224,25 +217,36 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording)
     active = term if projection.keeps_inertia else _without_inertia(term)
     box = term_bounds(active, limits, dict(given))
-    beta, converged, border = _search(active, recording, rows, box, grid)
-    solved, jacobian, error = _solve(active, beta, recording, rows)
+    beta, converged, border = search(active, recording, rows, box, grid)
+    alpha, jacobian, error = _solve(active, beta, recording, rows)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)
-    inertia = _inertia(term, active, solved, beta, recording, weak, rows, error)
-    matrix, alpha, force_error = _assemble(
-        term, active, solved, beta, recording, rows, weak, jacobian, error, inertia
-    )
+    place = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
+    weighs = place and active is not term
+    if weighs:
+        mass = _mass(Model(active.with_beta(beta), alpha), recording, weak)
+        # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
+        slope = signals.local_quadratic(recording, recording.velocity, 8 * limits.interval, 8)[1]
+        error = error - mass[0] * slope
+    block = uncertainty.blocks(rows.positive, rows.negative)
+    matrix = uncertainty.covariance(jacobian, error, weight, block)
+    if weighs:
+        alpha, matrix = _insert(place[0], mass, alpha, matrix)
+    nothing = ~finite | (jnp.sum(weight) <= 0)
+    alpha = jnp.where(nothing, jnp.nan, alpha)
+    matrix = jnp.where(nothing, jnp.inf, matrix)
     model = Model(term.with_beta(beta), alpha, recording.units)
     slipping = limits.fastest > signals.SLIP_DEVIATIONS * signals.velocity_noise(recording)
     hidden = jnp.any(jnp.isinf(jnp.diagonal(matrix)))
-    result = _verdict(finite, slipping, jnp.sum(weight) > 0, hidden, border, converged)
-    nothing = ~finite | (jnp.sum(weight) <= 0)
-    alpha = jnp.where(nothing, jnp.nan, alpha)
-    model = eqx.tree_at(lambda m: m.alpha, model, alpha)
-    matrix = jnp.where(nothing, jnp.inf, matrix)
-    name = "weak_form" if projection.keeps_inertia else "closed_windows"
     return Identified(
-        model, matrix, result, rows.windows, rows.covered, force_error, minimum, name
+        model,
+        matrix,
+        _verdict(finite, slipping, jnp.sum(weight) > 0, hidden, border, converged),
+        rows.windows,
+        rows.covered,
+        _force_error(model, recording, weak),
+        minimum,
+        "weak_form" if projection.keeps_inertia else "closed_windows",
     )
 
 
@@ -275,202 +279,63 @@ def _sanitised(recording: Recording) -> Recording:
 
 
 def _without_inertia(term: AbstractTerm) -> AbstractTerm:
-    kept = tuple(t for t in _summands(term) if "acceleration" not in t.coordinates)
+    kept = tuple(t for t in summands(term) if not isinstance(t, Inertia))
     if not kept:
         raise ValueError("The model has no term but inertia; add friction, e.g. terms.Coulomb().")
     return Sum(kept)
 
 
-def _summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
-    return term.terms if isinstance(term, Sum) else (term,)
-
-
-def _sides(term: AbstractTerm):
-    """The shared summands, and the two directions' own, where the directions can be separated."""
-    terms = _summands(term)
-    shared = tuple(t for t in terms if not isinstance(t, Directional))
-    sided = [t for t in terms if isinstance(t, Directional)]
-    if not any(t.nonlinear for t in sided) or any(t.nonlinear for t in shared):
-        return None
-    positive = Sum(tuple(leaf for t in sided for leaf in _summands(t.positive)))
-    return shared, positive
-
-
-def _search(term, recording, rows: Rows, box, grid):
-    """β of the least reduced cost: grid, then refinement; with what can be said about it."""
-    if not term.nonlinear:
-        yes = jnp.ones((), bool)
-        return jnp.zeros((0,), rows.target.dtype), yes, ~yes
-    stopped = jax.lax.stop_gradient
-    frozen, frozen_rows, limits = stopped(recording), stopped(rows), stopped(box)
-    logarithmic = tuple(p.logarithmic for p in term.nonlinear)
-    sides = _sides(term)
-    if sides is None:
-        start, cell = _grid_whole(term, frozen, frozen_rows, limits, logarithmic, grid)
-    else:
-        start, cell = _grid_sides(sides, frozen, frozen_rows, limits, logarithmic, grid)
-
-    def residuals_of(recording, rows, box):
-        linear, root, target = _linear(term, recording, rows)
-        bumps = reduced.part(term, True)
-
-        def residuals(unit):
-            beta = reduced.decode(unit, box, logarithmic)
-            columns = reduced.weighted(rows, bumps.with_beta(beta), recording)
-            return reduced.residual(linear, target, root[:, None] * columns)
-
-        return residuals
-
-    unit, converged = reduced.refine(residuals_of(frozen, frozen_rows, limits), start, cell)
-    border = jnp.any((unit <= 0) | (unit >= 1))
-    unit = _implicit(residuals_of, unit, (recording, rows, box), (frozen, frozen_rows, limits))
-    return reduced.decode(unit, box, logarithmic), converged, border
-
-
-def _implicit(residuals_of, unit, data, frozen):
-    """The minimiser with its derivative by the data: one Newton step with a frozen Hessian.
-
-    At the minimiser the step is zero, and its derivative is that of the implicit function
-    theorem, −H⁻¹ ∂(∇L)/∂data; neither grid nor iterations are differentiated.
-    """
-    unit = jax.lax.stop_gradient(unit)
-
-    def height(residuals, y):
-        return 0.5 * jnp.sum(residuals(y) ** 2)
-
-    gradient = jax.jacfwd(lambda y: height(residuals_of(*data), y))(unit)
-    hessian = jax.jacfwd(jax.jacfwd(lambda y: height(residuals_of(*frozen), y)))(unit)
-    free = jnp.where((unit > 0) & (unit < 1), 1.0, 0.0)
-    hessian = hessian * (free[:, None] * free[None, :]) + jnp.diag(1 - free)
-    step = jnp.linalg.solve(jax.lax.stop_gradient(hessian), gradient * free)
-    # Only the derivative of the step is wanted; its value is rounding.
-    step = step - jax.lax.stop_gradient(step)
-    return unit - jnp.where(jnp.isfinite(step), step, 0.0)
-
-
-def _linear(term, recording, rows: Rows):
-    """Orthonormal weighted columns without β, root weights, and the force projected, weighted."""
-    root = jnp.sqrt(rows.positive + rows.negative)
-    columns = reduced.weighted(rows, reduced.part(term, False), recording)
-    basis = reduced.orthonormal(root[:, None] * columns)
-    offset = term.offset(recording)[:, None]
-    target = root * (rows.target - rows.project(offset, jnp.zeros_like(offset))[:, 0])
-    return basis, root, reduced.project_out(basis, target[:, None])[:, 0]
-
-
-def _grid_whole(term, recording, rows, box, logarithmic, points):
-    """The best grid point over all nonlinear parameters together, in the unit cube."""
-    basis, root, target = _linear(term, recording, rows)
-    bumps = reduced.part(term, True)
-
-    def columns(unit):
-        beta = reduced.decode(unit, box, logarithmic)
-        return reduced.weighted(rows, bumps.with_beta(beta), recording)
-
-    grid = reduced.grid_points(len(logarithmic), points, root.dtype)
-    costs = reduced.grid_costs(columns, grid, basis[None], target[None], root[None], False)
-    return _best(grid, costs[0])
-
-
-def _grid_sides(sides, recording, rows, box, logarithmic, points):
-    """The best grid points of the two directions: two rows of one batch (eq. 24).
-
-    Where terms are shared (the weak form's inertia), each direction has a copy of its own here;
-    the refinement that follows ties them again.
-    """
-    shared, inner = sides
-    roots = jnp.sqrt(jnp.stack([rows.positive, rows.negative]))
-    linear = [reduced.part(inner, False), *shared]
-    columns = [reduced.weighted(rows, t, recording) for t in linear if t is not None]
-    stacked = jnp.concatenate(columns, axis=1)
-    bases = jax.vmap(lambda root: reduced.orthonormal(root[:, None] * stacked))(roots)
-    targets = jax.vmap(
-        lambda basis, root: reduced.project_out(basis, (root * rows.target)[:, None])[:, 0]
-    )(bases, roots)
-    bumps = reduced.part(inner, True)
-    count = len(inner.nonlinear)
-
-    def columns_at(unit):
-        beta = reduced.decode(unit, box[:, :count], logarithmic[:count])
-        return reduced.weighted(rows, bumps.with_beta(beta), recording)
-
-    grid = reduced.grid_points(count, points, roots.dtype)
-    costs = reduced.grid_costs(columns_at, grid, bases, targets, roots, False)
-    starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
-    return starts.reshape(-1), cells.reshape(-1)
-
-
-def _best(grid, costs):
-    start = grid[jnp.argmin(costs)]
-    side = round(grid.shape[0] ** (1 / grid.shape[1]))
-    return start, jnp.full_like(start, 1 / (side - 1))
-
-
 def _solve(term, beta, recording, rows: Rows):
     """Affine parameters at β, the Jacobian by all parameters, and the residual, unweighted."""
     known = term.with_beta(beta)
-    columns = reduced.weighted(rows, known, recording)
-    offset = known.offset(recording)[:, None]
-    target = rows.target - rows.project(offset, jnp.zeros_like(offset))[:, 0]
+    columns = rows.columns(known, recording)
+    target = rows.target - rows.offset(known, recording)
     root = jnp.sqrt(rows.positive + rows.negative)
     alpha = least_squares(root[:, None] * columns, root * target)
+    if not term.nonlinear:
+        return alpha, columns, target - columns @ alpha
 
     def by_beta(beta):
-        return reduced.weighted(rows, term.with_beta(beta), recording) @ jax.lax.stop_gradient(alpha)
+        return rows.columns(term.with_beta(beta), recording) @ jax.lax.stop_gradient(alpha)
 
-    steep = jax.jacfwd(by_beta)(beta) if term.nonlinear else jnp.zeros((target.shape[0], 0))
-    return alpha, jnp.concatenate([columns, steep.astype(columns.dtype)], axis=1), target - columns @ alpha
+    jacobian = jnp.concatenate([columns, jax.jacfwd(by_beta)(beta)], axis=1)
+    return alpha, jacobian, target - columns @ alpha
 
 
 def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
-    """Least-squares coefficients, eq. (19), of least norm where columns depend on each other."""
+    """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
     scale = jnp.linalg.norm(columns, axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     basis = reduced.orthonormal(columns / scale[None, :])
-    # R of the QR factorisation; a dependent column has a zero row, and takes no part.
     upper = jnp.triu(basis.T @ (columns / scale[None, :]))
     idle = jnp.diagonal(upper) <= 0
     upper = jnp.where(idle[:, None], jnp.eye(scale.shape[0], dtype=upper.dtype), upper)
     return jax.scipy.linalg.solve_triangular(upper, basis.T @ target) / scale
 
 
-def _inertia(term, active, alpha, beta, recording, weak: Rows, rows, error):
-    """Mass and the variance of it, from what friction leaves in the weak form; NaN without one."""
-    if not any(isinstance(t, Inertia) for t in _summands(term)) or active is term:
-        return None
-    push = weak.project(jnp.zeros_like(recording.velocity)[:, None], recording.velocity[:, None])[:, 0]
-    known = active.with_beta(beta)
-    friction = known.columns(recording) @ alpha + known.offset(recording)
-    friction = weak.project(friction[:, None], jnp.zeros_like(friction)[:, None])[:, 0]
-    left = weak.target - friction
+def _mass(friction: Model, recording: Recording, weak: Rows):
+    """Mass and its variance, from what the identified friction leaves of the weak form's force."""
+    push = weak.columns(Inertia(), recording)
+    left = weak.target - weak.project(friction.force(recording)[:, None])[:, 0]
     weight = weak.positive + weak.negative
-    mass = least_squares((jnp.sqrt(weight) * push)[:, None], jnp.sqrt(weight) * left)
+    root = jnp.sqrt(weight)
+    mass = least_squares(root[:, None] * push, root * left)
     block = uncertainty.blocks(weak.positive, weak.negative)
-    matrix = uncertainty.covariance(push[:, None], left - push * mass[0], weight, block)
+    matrix = uncertainty.covariance(push, left - push @ mass, weight, block)
     return mass[0], matrix[0, 0]
 
 
-def _assemble(term, active, alpha, beta, recording, rows, weak, jacobian, error, inertia):
-    """Covariance and affine parameters in the order of the whole model, and the force error."""
-    weight = rows.positive + rows.negative
-    block = uncertainty.blocks(rows.positive, rows.negative)
-    if inertia is not None:
-        slope = signals.local_quadratic(
-            recording, recording.velocity, 8 * signals.interval(recording), 8
-        )[1]
-        error = error - inertia[0] * slope
-    matrix = uncertainty.covariance(jacobian, error, weight, block)
-    if inertia is not None:
-        place = [i for i, p in enumerate(term.affine) if p.name == "inertia"][0]
-        alpha = jnp.insert(alpha, place, inertia[0])
-        matrix = jnp.insert(jnp.insert(matrix, place, 0.0, axis=0), place, 0.0, axis=1)
-        matrix = matrix.at[place, place].set(inertia[1])
-    known = term.with_beta(beta)
-    predicted = weak.project(known.columns(recording), known.momentum(recording)) @ alpha
-    offset = known.offset(recording)[:, None]
-    predicted = predicted + weak.project(offset, jnp.zeros_like(offset))[:, 0]
-    use = (weak.positive + weak.negative) > 0
-    left = jnp.where(use, weak.target - predicted, 0.0)
-    size = jnp.linalg.norm(jnp.where(use, weak.target, 0.0))
-    return matrix, alpha, jnp.linalg.norm(left) / jnp.where(size > 0, size, 1.0)
+def _insert(place, mass, alpha, matrix):
+    """Affine parameters and covariance with the mass in its place among them."""
+    alpha = jnp.insert(alpha, place, mass[0])
+    matrix = jnp.insert(jnp.insert(matrix, place, 0.0, axis=0), place, 0.0, axis=1)
+    return alpha, matrix.at[place, place].set(mass[1])
 
+
+def _force_error(model: Model, recording: Recording, weak: Rows):
+    """norm(u − û)/norm(u) over the rows in motion, both passed through the same kernel."""
+    predicted = weak.columns(model.term, recording) @ model.alpha
+    left = weak.target - predicted - weak.offset(model.term, recording)
+    root = jnp.sqrt(weak.moving)
+    size = jnp.linalg.norm(root * weak.target)
+    return jnp.linalg.norm(root * left) / jnp.where(size > 0, size, 1.0)

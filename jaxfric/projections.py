@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 
 from .recording import Recording
 from .signals import continuous, interval, kernel, kernel_slope, scales
-from .terms.base import Scales
+from .terms.base import AbstractTerm, Scales
 
 # Levels of velocity tried for the ends of a window, between the first and the last velocity of a
 # segment: outside that range windows only get shorter.
@@ -27,27 +27,37 @@ class Rows(eqx.Module):
 
     - `target`: the projected force, N, shape `(J,)`.
     - `positive`, `negative`: weights of the rows in each direction of slip, s, `(J,)`.
+    - `moving`: weights of the rows on which a model is judged: reversals too, rest not, `(J,)`.
     - `time`: s, `(J,)`.
     - `windows`: how many windows (or, in the weak form, slip stretches) were used.
     - `covered`: share of the valid slip time that the rows use.
-    - `jump`: what open ends leave of ∫ v̇ dt in each direction, m/s, `(2,)`; zero for closed ones.
     """
 
     target: Float[Array, " J"]
     positive: Float[Array, " J"]
     negative: Float[Array, " J"]
+    moving: Float[Array, " J"]
     time: Float[Array, " J"]
     windows: Float[Array, ""]
     covered: Float[Array, ""]
     _filter: "Filter | None" = None
 
     def project(
-        self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"]
+        self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None = None
     ) -> Float[Array, "J p"]:
         """Columns as rows of the regression, shape `(J, p)`; `momentum` enters differentiated."""
-        if self._filter is None:
-            return columns
-        return self._filter.smooth(columns) + self._filter.differentiate(momentum)
+        return columns if self._filter is None else self._filter.apply(columns, momentum)
+
+    def columns(self, term: AbstractTerm | None, recording: Recording) -> Float[Array, "J p"]:
+        """The rows of a term's columns, `(J, p)`; no columns where there is no term."""
+        if term is None:
+            return jnp.zeros((self.target.shape[0], 0), self.target.dtype)
+        momentum = term.momentum(recording) if term.inertial else None
+        return self.project(term.columns(recording), momentum)
+
+    def offset(self, term: AbstractTerm, recording: Recording) -> Float[Array, " J"]:
+        """The rows of a term's known part f0, `(J,)`."""
+        return self.project(term.offset(recording)[:, None])[:, 0]
 
 
 class AbstractProjection(eqx.Module):
@@ -77,9 +87,9 @@ class ClosedWindows(AbstractProjection):
         used = jnp.sum(positive) + jnp.sum(negative)
         first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
         windows = jnp.sum(first & (end > begin))
-        return Rows(
-            recording.force, positive, negative, recording.time, windows, used / jnp.maximum(slip, 1e-30)
-        )
+        covered = used / jnp.where(slip > 0, slip, 1.0)
+        force, time = recording.force, recording.time
+        return Rows(force, positive, negative, positive + negative, time, windows, covered)
 
 
 def _windows(recording: Recording) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
@@ -164,53 +174,77 @@ def _slip_time(recording: Recording, limits: Scales, begin, end):
 
 
 class Filter(eqx.Module):
-    """A kernel slid along the record: local averages, and the derivative that sits on the kernel."""
+    """A kernel slid along the record: local averages, and the derivative that sits on the kernel.
 
-    time: Float[Array, " N"]
-    duration: Float[Array, " N"]
-    typical: Float[Array, ""]
+    `average` and `slope`: weights of the samples around each centre, `(2 reach + 1, J)`. The
+    slope weights are normalised so that a constant has none and a straight line in time exactly
+    its own, on any clock.
+    """
+
+    average: Float[Array, "K J"]
+    slope: Float[Array, "K J"]
     reach: int = eqx.field(static=True)
     stride: int = eqx.field(static=True)
 
-    @property
-    def centres(self) -> Float[Array, " J"]:
-        """Indices of the samples at which the kernels are centred, shape `(J,)`."""
-        return jnp.arange(self.reach, self.time.shape[0] - self.reach, self.stride)
-
-    def gather(self, values: Float[Array, "N *p"], offset: Array) -> Float[Array, "J *p"]:
+    def gather(self, values: Float[Array, "N *p"], offset) -> Float[Array, "J *p"]:
         """The values `offset` samples from each centre."""
-        count = len(range(self.reach, self.time.shape[0] - self.reach, self.stride))
-        length = (count - 1) * self.stride + 1
-        piece = jax.lax.dynamic_slice_in_dim(values, self.reach + offset, length)
-        return piece[:: self.stride]
+        return _gather(values, offset, self.reach, self.stride)
 
-    def _weigh(self, values, shape, relative):
-        """Sums over the kernel of shape(τ) Δt values, the values taken relative to the centre."""
-        centre = self.gather(self.time, jnp.asarray(0))
-        middle = self.gather(values, jnp.asarray(0))
+    def apply(
+        self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None
+    ) -> Float[Array, "J p"]:
+        """Kernel averages of columns plus those of the time derivative of momentum, `(J, p)`.
 
-        def add(total, offset):
-            tau = (self.gather(self.time, offset) - centre) / (self.reach * self.typical)
-            weight = shape(tau) * self.gather(self.duration, offset)
-            piece = self.gather(values, offset)
-            piece = piece - middle if relative else piece
-            return total + weight[:, None] * piece, None
+        ∫ φ ḣ dt = −∫ φ̇ h dt: the derivative is taken on the kernel.
+        """
+
+        def add(total, step):
+            offset, average, slope = step
+            total = total + average[:, None] * self.gather(columns, offset)
+            if momentum is not None:
+                total = total + slope[:, None] * self.gather(momentum, offset)
+            return total, None
 
         offsets = jnp.arange(-self.reach, self.reach + 1)
-        return jax.lax.scan(add, jnp.zeros_like(middle), offsets)[0]
+        empty = jnp.zeros((self.average.shape[1], columns.shape[1]), columns.dtype)
+        return jax.lax.scan(add, empty, (offsets, self.average, self.slope))[0]
 
-    def smooth(self, values: Float[Array, "N p"]) -> Float[Array, "J p"]:
-        """Kernel averages of columns, `(J, p)`."""
-        mass = self._weigh(jnp.ones_like(self.time)[:, None], kernel, False)
-        return self._weigh(values, kernel, False) / jnp.where(mass > 0, mass, 1.0)
 
-    def differentiate(self, values: Float[Array, "N p"]) -> Float[Array, "J p"]:
-        """Kernel averages of the time derivative of columns, `(J, p)`: ∫φ ḣ dt = −∫φ̇ h dt.
+def _gather(values, offset, reach, stride):
+    count = len(range(reach, values.shape[0] - reach, stride))
+    piece = jax.lax.dynamic_slice_in_dim(values, reach + offset, (count - 1) * stride + 1)
+    return piece[::stride]
 
-        Normalised so that a straight line in time has exactly its slope, on any clock.
-        """
-        rise = self._weigh(self.time[:, None], kernel_slope, True)
-        return self._weigh(values, kernel_slope, True) / jnp.where(rise != 0, rise, 1.0)
+
+def make_filter(recording: Recording, half_width: int) -> Filter:
+    """The kernel of that half-width in samples on the clock of a recording.
+
+    **Raises:** `ValueError` if the recording is shorter than the kernel.
+    """
+    if recording.num_samples <= 2 * half_width:
+        raise ValueError(
+            f"A kernel of {2 * half_width + 1} samples does not fit into a recording of "
+            f"{recording.num_samples}; use a shorter WeakForm(half_width=...)."
+        )
+    stride = max(1, half_width // 2)
+    typical = interval(recording)
+    steps = jnp.where(continuous(recording, typical), jnp.diff(recording.time), 0.0)
+    duration = 0.5 * (jnp.pad(steps, (0, 1)) + jnp.pad(steps, (1, 0)))
+    centre = _gather(recording.time, 0, half_width, stride)
+
+    def weigh(offset):
+        since = _gather(recording.time, offset, half_width, stride) - centre
+        lasts = _gather(duration, offset, half_width, stride)
+        tau = since / (half_width * typical)
+        slope = kernel_slope(tau) * lasts
+        return kernel(tau) * lasts, slope, slope * since
+
+    average, slope, rise = jax.vmap(weigh)(jnp.arange(-half_width, half_width + 1))
+    mass, rise = jnp.sum(average, axis=0), jnp.sum(rise, axis=0)
+    average = average / jnp.where(mass > 0, mass, 1.0)[None, :]
+    slope = slope / jnp.where(rise != 0, rise, 1.0)[None, :]
+    slope = slope.at[half_width].add(-jnp.sum(slope, axis=0))
+    return Filter(average, slope, half_width, stride)
 
 
 class WeakForm(AbstractProjection):
@@ -224,40 +258,27 @@ class WeakForm(AbstractProjection):
     keeps_inertia = True
 
     def rows(self, recording: Recording) -> Rows:
-        """The rows of a prepared recording, one for each kernel wholly inside slip."""
+        """The rows of a prepared recording; weighted where the kernel lies wholly inside slip."""
         limits = scales(recording)
         filter_ = make_filter(recording, self.half_width)
-        velocity = recording.velocity
-        together = continuous(recording, interval(recording))
-        links = jnp.pad(jnp.cumsum(~together), (1, 0))
-        slow_up, slow_down = velocity <= limits.slowest, velocity >= -limits.slowest
+        velocity, reach = recording.velocity, self.half_width
+        breaks = jnp.pad(jnp.cumsum(~continuous(recording, interval(recording))), (1, 0))
+        whole = filter_.gather(breaks, reach) == filter_.gather(breaks, -reach)
 
-        def clear(broken):
-            count = jnp.pad(jnp.cumsum(broken), (1, 0))
-            after = filter_.gather(count[1:], jnp.asarray(self.half_width))
-            return after - filter_.gather(count[:-1], jnp.asarray(-self.half_width)) == 0
+        def within(slips):
+            stops = jnp.cumsum(~slips)
+            before = filter_.gather(stops - (~slips).astype(stops.dtype), -reach)
+            return whole & (filter_.gather(stops, reach) == before)
 
-        unbroken = (
-            filter_.gather(links, jnp.asarray(self.half_width))
-            == filter_.gather(links, jnp.asarray(-self.half_width))
-        )
-        target = filter_.smooth(recording.force[:, None])[:, 0]
-        spacing = filter_.stride * filter_.typical
-        positive = jnp.where(unbroken & clear(slow_up), spacing, 0.0)
-        negative = jnp.where(unbroken & clear(slow_down), spacing, 0.0)
-        used = jnp.sum(positive) + jnp.sum(negative)
-        slip = jnp.sum(jnp.where(jnp.abs(velocity) > limits.slowest, filter_.typical, 0.0))
+        spacing = filter_.stride * interval(recording)
+        positive = jnp.where(within(velocity > limits.slowest), spacing, 0.0)
+        negative = jnp.where(within(velocity < -limits.slowest), spacing, 0.0)
+        moving = (jnp.abs(velocity) > limits.slowest) & recording.mask
+        sampled = filter_.apply(jnp.stack([recording.force, moving.astype(velocity.dtype)], 1), None)
         sign = jnp.sign(positive - negative)
         windows = jnp.sum((sign != jnp.pad(sign[:-1], (1, 0))) & (sign != 0))
-        time = filter_.gather(recording.time, jnp.asarray(0))
-        return Rows(
-            target, positive, negative, time, windows, used / jnp.maximum(slip, 1e-30), filter_
-        )
-
-
-def make_filter(recording: Recording, half_width: int) -> Filter:
-    """The kernel of that half-width in samples on the clock of a recording."""
-    typical = interval(recording)
-    steps = jnp.where(continuous(recording, typical), jnp.diff(recording.time), 0.0)
-    duration = 0.5 * (jnp.pad(steps, (0, 1)) + jnp.pad(steps, (1, 0)))
-    return Filter(recording.time, duration, typical, half_width, max(1, half_width // 2))
+        slip = jnp.sum(jnp.where(moving, interval(recording), 0.0))
+        covered = (jnp.sum(positive) + jnp.sum(negative)) / jnp.where(slip > 0, slip, 1.0)
+        mostly = jnp.where(whole & (sampled[:, 1] > 0.5), spacing, 0.0)
+        time = filter_.gather(recording.time, 0)
+        return Rows(sampled[:, 0], positive, negative, mostly, time, windows, covered, filter_)

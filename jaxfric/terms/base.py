@@ -102,6 +102,11 @@ class AbstractTerm(eqx.Module):
         Kim, Kim & Ha 2004), so that neither mass nor acceleration is needed to identify them.
         """
 
+    @property
+    @abstractmethod
+    def inertial(self) -> bool:
+        """Whether the term has momentum, so that its force contains an acceleration."""
+
     @abstractmethod
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         """The regressors g, one column for each affine parameter, shape `(N, p)`."""
@@ -138,6 +143,10 @@ class AbstractLaw(AbstractTerm):
 
     coordinates: ClassVar[frozenset[str]] = frozenset({"velocity"})  # type: ignore[misc]
     nonlinear: ClassVar[tuple[Parameter, ...]] = ()  # type: ignore[misc]
+
+    @property
+    def inertial(self) -> bool:
+        return type(self).impulse is not AbstractLaw.impulse
 
     @abstractmethod
     def law(self, sample: Sample) -> tuple[Float[Array, ""], ...]:
@@ -185,6 +194,10 @@ class Sum(AbstractTerm):
     def coordinates(self) -> frozenset[str]:
         return frozenset().union(*(term.coordinates for term in self.terms))
 
+    @property
+    def inertial(self) -> bool:
+        return any(term.inertial for term in self.terms)
+
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return jnp.concatenate([term.columns(recording) for term in self.terms], axis=-1)
 
@@ -229,6 +242,10 @@ class Directional(AbstractTerm):
     @property
     def coordinates(self) -> frozenset[str]:
         return self.positive.coordinates | {"velocity"}
+
+    @property
+    def inertial(self) -> bool:
+        return self.positive.inertial or self.negative.inertial
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return self._sides(
