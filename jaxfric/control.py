@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 
@@ -130,7 +131,7 @@ class Encoder(eqx.Module):
 
     def __check_init__(self):
         known = not isinstance(self.resolution, jax.core.Tracer)
-        if known and not bool(jnp.all(self.resolution > 0)):
+        if known and not bool(np.all(np.asarray(self.resolution) > 0)):
             raise ValueError(
                 f"Encoder(resolution={self.resolution}): the resolution must be positive, in "
                 "units of position per count; leave the encoder out for an ideal sensor."

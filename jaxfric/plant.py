@@ -45,6 +45,15 @@ class Plant(eqx.Module):
         )
         return mass, by_position * velocity + by_time
 
+    def rates(self, position: Scalar, velocity: Scalar, rest: "Surroundings"):
+        """Inertia, and how fast the resistance changes: M, (∂F/∂v, ∂F/∂x)."""
+
+        def force(x, v):
+            return self.resistance(x, v[None], rest)[0]
+
+        stiffness, damping = jax.grad(force, argnums=(0, 1))(position, velocity)
+        return self.inertia(position, velocity, rest)[0], (damping, stiffness)
+
     def step(self, state: tuple[Scalar, Scalar], force: Scalar, span: Scalar, rest: "Surroundings"):
         """Position and velocity after `span` seconds under a constant force.
 

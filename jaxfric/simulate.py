@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from . import signals
@@ -88,8 +89,9 @@ def simulate(
       where they are unknown, 8).
     - `smooth`: a velocity ε, m/s: replaces stick-slip by the blend (1 ± tanh(v/ε))/2 of the laws
       for the two directions. An approximation (the axis creeps where it should stick), for
-      gradients that must also see how sticking depends on the parameters. The exact simulation
-      is differentiable too, almost everywhere.
+      gradients that must also see how sticking depends on the parameters; it is stiff, so give
+      `substeps` above 5 Δt F/(M ε) inside `jax.jit`. The exact simulation is differentiable too,
+      almost everywhere.
     - `initial`: position and velocity at the start, by default those of the set-point (of the
       recorded motion in open loop). Every segment of the recording starts anew.
 
@@ -127,7 +129,8 @@ def _check(model, reference, controller, encoder, force_noise, key):
     name = reference.source or "the reference"
     if reference.num_samples < 2:
         raise ValueError(f"simulate needs two samples or more for a clock; {name} has one.")
-    if controller is not None and reference.position is None and "reference" not in reference.channels:
+    aimless = reference.position is None and "reference" not in reference.channels
+    if controller is not None and aimless:
         raise ValueError(
             f"simulate with a controller needs a set-point; {name} has neither a channel "
             "'reference' nor a position. Add one, or leave out the controller to drive by force."
@@ -143,11 +146,13 @@ def _check(model, reference, controller, encoder, force_noise, key):
 
 
 def _positive(value) -> bool:
-    return not isinstance(value, jax.core.Tracer) and bool(jnp.any(jnp.asarray(value) > 0))
+    return not isinstance(value, jax.core.Tracer) and bool(np.any(np.asarray(value) > 0))
 
 
 def _massless(model, reference) -> bool:
-    return not bool(jnp.all(_rates(model, reference, None)[0] > 0))
+    # Inside jax.jit a computation on known numbers is put off too, unless one insists.
+    with jax.ensure_compile_time_eval():
+        return not bool(np.all(np.asarray(_rates(model, reference, None)[0]) > 0))
 
 
 def _traced(tree) -> bool:
@@ -249,7 +254,8 @@ def _seen_velocity(state, measured, encoder, now):
         return state.velocity
     elapsed = state.elapsed
     known = elapsed > 0
-    return jnp.where(known, (measured - state.measured) / jnp.where(known, elapsed, 1.0), now.initial_velocity)
+    difference = (measured - state.measured) / jnp.where(known, elapsed, 1.0)
+    return jnp.where(known, difference, now.initial_velocity)
 
 
 def default_substeps(
@@ -262,12 +268,14 @@ def default_substeps(
     """
     if _traced((model, reference, smooth)):
         return TRACED_SUBSTEPS
-    mass, slopes = _rates(model, reference, smooth)
-    damping, stiffness = (jnp.nan_to_num(jnp.abs(slope)) / mass for slope in slopes)
-    rate = jnp.max(jnp.maximum(damping, jnp.sqrt(stiffness)))
-    interval = signals.interval(reference)
-    steps = float(interval * rate) / RATE_PER_STEP
-    return int(min(max(math.ceil(steps), 1), MOST_SUBSTEPS)) if math.isfinite(steps) else MOST_SUBSTEPS
+    with jax.ensure_compile_time_eval():
+        mass, slopes = _rates(model, reference, smooth)
+        damping, stiffness = (jnp.nan_to_num(jnp.abs(slope)) / mass for slope in slopes)
+        rate = jnp.max(jnp.maximum(damping, jnp.sqrt(stiffness)))
+        steps = float(signals.interval(reference) * rate) / RATE_PER_STEP
+    if not math.isfinite(steps):
+        return MOST_SUBSTEPS
+    return min(max(math.ceil(steps), 1), MOST_SUBSTEPS)
 
 
 @eqx.filter_jit
@@ -277,39 +285,12 @@ def _rates(model, reference, smooth):
     plant = Plant(*_cast((model, None if smooth is None else jnp.asarray(smooth)), dtype))
     together = reference.segment[1:] == reference.segment[:-1]
     goal, velocity = _set_point(reference, True, together)
-    fastest = jnp.nanmax(jnp.abs(velocity))
-    speeds = jnp.maximum(fastest * jnp.asarray(_SPEEDS, dtype), slowest(dtype))
+    speeds = jnp.nanmax(jnp.abs(velocity)) * jnp.asarray(_SPEEDS, dtype)
+    speeds = jnp.maximum(speeds, slowest(dtype))
+    rest = [] if smooth is None else [jnp.zeros(1, dtype)]
+    grid = jnp.concatenate([speeds, -speeds, *rest])
     chosen = jnp.linspace(0, goal.shape[0] - 1, 256).astype(int)
-    rest = Surroundings(reference.time[chosen], {k: c[chosen] for k, c in reference.channels.items()})
-    zero = jnp.zeros(1, dtype)
-    grid = jnp.concatenate([speeds, -speeds] if smooth is None else [speeds, -speeds, zero])
-
-    def at(x, v, rest):
-        def force(x, v):
-            return plant.resistance(x, v[None], rest)[0]
-
-        stiffness, damping = jax.grad(force, argnums=(0, 1))(x, v)
-        return plant.inertia(x, v, rest)[0], (damping, stiffness)
-
-    each_speed = jax.vmap(at, in_axes=(None, 0, None))
-    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, rest)
-
-
-def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
-    """The force that the recorded motion needs, N, shape `(N,)`.
-
-    The model's columns, and the zero-phase smoothing derivative of its momentum, whose width is
-    chosen from the noise of the position (of the velocity where there is no position). Pure: may
-    stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
-    to break-away, the value is that of the terms at rest.
-    """
-    prepared = signals.prepare(recording)
-    reach = signals.TRACED_REACH if _traced(prepared) else signals.HALF_WIDTHS[-1]
-    motion = prepared
-    if recording.position is None:
-        motion = dataclasses.replace(prepared, position=prepared.velocity)
-    width = jax.lax.stop_gradient(signals.choose_half_width(motion, reach))
-    span = width * signals.interval(prepared)
-    momentum = model.momentum(prepared)
-    rate = signals.local_quadratic(prepared, momentum, span, reach)[1]
-    return model.force(prepared) + rate
+    channels = {name: channel[chosen] for name, channel in reference.channels.items()}
+    each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
+    surroundings = Surroundings(reference.time[chosen], channels)
+    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)
