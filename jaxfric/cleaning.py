@@ -189,7 +189,8 @@ def _unwrap(signals, mask, segment, rows, notes) -> None:
     jump = np.abs(step) > 0.5 * np.ptp(valid)
     turn = _turn(valid, step, jump)
     if turn is None:
-        if jump.any() and not _coarse(step, jump):
+        # Where many steps are a good part of the range, the motion is coarsely sampled, not faulty.
+        if jump.any() and np.quantile(np.abs(step), 0.9) < 0.25 * np.ptp(valid):
             row = rows[index[1:]][np.argmax(jump)]
             notes.append(
                 f"Warning: the position jumps by more than half its range at "

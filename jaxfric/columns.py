@@ -11,14 +11,15 @@ ROLES = (
     "time", "position", "velocity", "force", "reference", "load", "temperature", "segment"
 )  # fmt: skip
 
-# Written without separators: `time_stamp`, `TimeStamp` and `time stamp` are all `timestamp`.
+# `time_stamp`, `TimeStamp` and `time stamp` are all `timestamp`; symbols are taken to the letter,
+# for `qd` is a velocity in most logs but `q_d` is a desired position in some.
 _SYNONYMS = {
     "time": "time times t timestamp tstamp elapsed elapsedtime seconds sec",
-    "position": "position pos q qm x angle theta displacement encoder enc qpos jointangle "
+    "position": "position pos q qm q_m x angle theta displacement encoder enc qpos jointangle "
     "angularposition rotorposition",
-    "velocity": "velocity vel v qd dq qdot qvel xd dx xdot speed omega angularvelocity thetadot "
-    "dtheta angularspeed rpm",
-    "force": "force torque tau current u vir effort moment thrust f i iq qaxiscurrent "
+    "velocity": "velocity vel v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
+    "angularvelocity angularspeed thetadot dtheta rpm",
+    "force": "force torque tau current u vir effort moment thrust f i iq i_q qaxiscurrent "
     "controleffort",
     "reference": "reference ref qg qref xref qdes xdes rposition",
     "load": "load payload loadmass normalload externalload",
@@ -46,14 +47,26 @@ _UNITS = {
 }  # fmt: skip
 _PER_SECOND = re.compile(r"^(.+?)(?:/s(?:ec)?|[_ ]?s(?:\^?-1|⁻¹)|_per_s|_s|ps)$")
 _BRACKETS = re.compile(r"[\[({]([^\])}]*)[\])}]")
+_LENGTHS = {"m", "mm", "µm", "nm", "cm", "rad", "mrad", "deg", "rev", "counts"}
+_FITTING = {
+    "time": {"s", "ms", "µs", "ns", "min"},
+    "position": _LENGTHS,
+    "reference": _LENGTHS,
+    "velocity": {f"{length}/s" for length in _LENGTHS} | {"rpm"},
+    "force": {"N", "kN", "mN", "MN", "A", "mA", "V", "mV", "%"}
+    | {f"{prefix}N·m" for prefix in ("", "m", "µ", "k", "M")},
+}
 _SECONDS = {"ms": "0.001", "µs": "1e-06", "ns": "1e-09", "min": "60"}
 
 
 def unit_of(text: str, role: str) -> str | None:
-    """The unit that a suffix or a bracket spells, or `None` where it is none.
+    """The unit that a suffix or a bracket spells, or `None` where it is none that fits the role."""
+    unit = _spelt(text, role)
+    return unit if unit in _FITTING.get(role, (unit,)) else None
 
-    `nm` is newton metre on a force and nanometre on a position, whence the role.
-    """
+
+def _spelt(text: str, role: str) -> str | None:
+    """As [`unit_of`][]; `nm` is newton metre on a force and nanometre on a position."""
     raw, text = text.strip(), text.strip().lower()
     if text == "nm" and role == "force":
         return "N·m"
@@ -72,7 +85,8 @@ def _words(name: str) -> list[str]:
 
 
 def _plain_role(words: list[str]) -> str | None:
-    return _ROLE_OF.get("".join(words))
+    joined = "".join(words)
+    return _ROLE_OF.get("_".join(words)) or (_ROLE_OF.get(joined) if len(joined) > 5 else None)
 
 
 def _role_of_words(words: list[str]) -> str | None:

@@ -15,8 +15,9 @@ import numpy as np
 
 from . import columns as names
 from .cleaning import clean
+from .delimited import Table, numbers
 from .recording import Recording
-from .tables import Table, load, numbers, optional
+from .tables import load, optional
 
 _SIGNALS = ("time", "force", "position", "velocity")
 _LARGEST_EXACT = 2**53  # whole numbers beyond this lose digits as float64

@@ -1,0 +1,474 @@
+"""Reading logs: formats, roles, units, clean-up; writing whole or not at all."""
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from jaxfric import io
+from jaxfric.columns import assign, describe
+
+DATA = Path(os.environ.get("JAXFRIC_DATA", Path(__file__).parents[2] / "shared" / "data"))
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the recordings folder (JAXFRIC_DATA) is absent"
+)
+
+
+def log(n=200, rate=1000.0):
+    t = np.arange(n) / rate
+    return {"time": t, "position": np.sin(7 * t), "force": np.cos(7 * t) + 0.5}
+
+
+def save(path, columns):
+    """A log in the format of the suffix, written without the code under test."""
+    columns = {name: np.asarray(column) for name, column in columns.items()}
+    if path.suffix == ".npz":
+        np.savez(path, **columns)
+    elif path.suffix == ".mat":
+        pytest.importorskip("scipy.io").savemat(path, columns)
+    elif path.suffix == ".h5mat":
+        path = path.with_suffix(".mat")
+        with pytest.importorskip("h5py").File(path, "w", userblock_size=512) as file:
+            for name, column in columns.items():
+                file[name] = column[None, :]
+        with path.open("r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file".ljust(512))
+    elif path.suffix == ".parquet":
+        pa = pytest.importorskip("pyarrow")
+        pytest.importorskip("pyarrow.parquet").write_table(pa.table(columns), path)
+    else:
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        lines = [",".join(columns), *(",".join(map(str, row)) for row in rows)]
+        path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+# ---- formats ----
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat", ".h5mat", ".parquet"])
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_every_format_gives_back_every_number(tmp_path, suffix, data):
+    n = data.draw(st.integers(16, 40))
+    steps = data.draw(hnp.arrays(float, n, elements=st.floats(1e-3, 3e-3)))
+    values = hnp.arrays(float, n, elements=st.floats(-1e12, 1e12))
+    columns = {"time": np.cumsum(steps), "velocity": data.draw(values), "torque": data.draw(values)}
+    recording, notes = io.read_with_notes(save(tmp_path / f"log{suffix}", columns))
+    assert notes == []
+    np.testing.assert_array_equal(recording.time, columns["time"])
+    np.testing.assert_array_equal(recording.velocity, columns["velocity"])
+    np.testing.assert_array_equal(recording.force, columns["torque"])
+    assert recording.position is None
+    assert bool(recording.mask.all()) and recording.num_segments == 1
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_written_tables_read_back_exactly(tmp_path, suffix):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    io.write_table(tmp_path / f"out{suffix}", log())
+    recording = io.read(tmp_path / f"out{suffix}")
+    for name, column in log().items():
+        np.testing.assert_array_equal(getattr(recording, name), column)
+
+
+CSV_SPELLINGS = {
+    "semicolon and decimal comma": "t [s];x [mm];f [N]\n{rows}",
+    "tabs": "t\tx\tf\n{rows}",
+    "blanks": "t x f\n{rows}",
+    "savetxt header": "# t,x,f\n{rows}",
+    "comments before": "# rig 7\n# spring\nt,x,f\n{rows}",
+    "byte order mark": "\ufefft,x,f\n{rows}",
+    "trailing delimiter": "t,x,f\n{rows}",
+    "quotes": '"t","x","f"\n{rows}',
+    "blank lines at the end": "t,x,f\n{rows}\n\n\n",
+    "cut off": "t,x,f\n{rows}\n0.9,1",
+}
+
+
+@pytest.mark.parametrize("kind", CSV_SPELLINGS)
+def test_csv_spellings(tmp_path, kind):
+    text = CSV_SPELLINGS[kind]
+    header = text.split("{")[0].strip().splitlines()[-1]
+    delimiter = next((d for d in ";\t," if d in header), " ")
+    columns = log(20)
+    cells = [[repr(float(cell)) for cell in row] for row in zip(*columns.values(), strict=True)]
+    lines = [delimiter.join(row) for row in cells]
+    if kind.startswith("semicolon"):
+        lines = [line.replace(".", ",") for line in lines]
+    if kind == "trailing delimiter":
+        lines = [line + "," for line in lines]
+    path = tmp_path / "log.csv"
+    path.write_text(text.format(rows="\n".join(lines)), encoding="utf-8")
+    recording, notes = io.read_with_notes(path)
+    np.testing.assert_array_equal(recording.time, columns["time"])
+    np.testing.assert_array_equal(recording.position, columns["position"])
+    np.testing.assert_array_equal(recording.force, columns["force"])
+    assert len(notes) == (kind == "cut off")
+
+
+def test_arrow_and_plain_csv_agree(tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow")
+    columns = log(50) | {"mode": ["a", "b"] * 25, "temp": [20.0] * 49 + [""]}
+    path = save(tmp_path / "log.csv", columns)
+    plain = io.read(path)
+    monkeypatch.setattr("jaxfric.delimited._SMALL_CSV", 0)
+    arrow = io.read(path)
+    for name in ("time", "position", "force"):
+        np.testing.assert_array_equal(getattr(arrow, name), getattr(plain, name))
+    np.testing.assert_array_equal(arrow.channels["temperature"], plain.channels["temperature"])
+
+
+def test_csv_needs_no_optional_library_and_is_quick(tmp_path, monkeypatch):
+    for library in ("pyarrow", "scipy", "h5py"):
+        monkeypatch.setitem(sys.modules, library, None)
+    path = save(tmp_path / "log.csv", log(25_000))
+    io.read(path)  # jax compiles its conversions on the first call
+    best = min(_seconds(lambda: io.load(path)) for _ in range(5))
+    # 0.03 s on two slow shared cores; the bound is ours, with room for a busy machine.
+    assert best < 0.1
+
+
+def _seconds(call):
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
+
+
+@pytest.mark.parametrize("suffix, library", [(".parquet", "pyarrow"), (".mat", "scipy")])
+def test_missing_library_says_what_to_install(tmp_path, monkeypatch, suffix, library):
+    for module in [name for name in sys.modules if name.split(".")[0] == library]:
+        monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.setitem(sys.modules, library, None)
+    path = tmp_path / f"log{suffix}"
+    path.write_bytes(b"x" * 600)
+    with pytest.raises(ValueError, match=r'pip install "jaxfric\[io\]"'):
+        io.read(path)
+
+
+def test_matlab_structures_matrices_and_scalars(tmp_path):
+    matlab = pytest.importorskip("scipy.io")
+    columns = log(30)
+    two = np.stack([columns["force"], columns["force"] + 1], axis=1)
+    content = {"log": {"time": columns["time"][:, None], "q": columns["position"]}, "tau": two}
+    matlab.savemat(tmp_path / "log.mat", content | {"gain": 3.0, "note": "spring"})
+    recording = io.read(tmp_path / "log.mat", columns={"force": "tau:2"})
+    np.testing.assert_array_equal(recording.force, columns["force"] + 1)
+    np.testing.assert_array_equal(recording.position, columns["position"])
+
+
+# ---- roles and units ----
+
+
+@pytest.mark.parametrize(
+    "name, role, unit",
+    [
+        ("time [s]", "time", "s"), ("Time_ms", "time", "ms"), ("TimeStamp", "time", None),
+        ("t(µs)", "time", "µs"), ("q", "position", None), ("pos_mm", "position", "mm"),
+        ("position_counts", "position", "counts"), ("motorPosition", "position", None),
+        ("actual_position [rad]", "position", "rad"), ("qd", "velocity", None),
+        ("velocity_rad_s", "velocity", "rad/s"), ("Speed (mm/s)", "velocity", "mm/s"),
+        ("speed_rpm", "velocity", "rpm"), ("TORQUE_Nm", "force", "N·m"), ("i_q", "force", None),
+        ("pos_nm", "position", "nm"), ("measured_current_A", "force", "A"), ("vir", "force", None),
+        ("qg", "reference", None), ("desired_position", "reference", None),
+        ("position_setpoint_mm", "reference", "mm"), ("log.tau", "force", None),
+        ("desired_current", None, None), ("current_setpoint", None, None),
+        ("reference_velocity", None, None), ("target_torque", None, None), ("q_d", None, None),
+        ("gear_temperature", None, None), ("mode", None, None), ("x_a", None, None),
+        ("motor temperature", "temperature", None), ("seg", "segment", None),
+    ],
+)  # fmt: skip
+def test_names(name, role, unit):
+    assert describe(name) == (role, unit)
+
+
+def test_what_is_wanted_is_never_the_force():
+    names = ["time", "position", "current", "desired_current", "reference_position"]
+    chosen = assign(names, None, "log")
+    assert chosen["force"] == "current" and chosen["reference"] == "reference_position"
+
+
+def test_ambiguous_names_are_an_error_that_lists_them(tmp_path):
+    path = save(tmp_path / "log.csv", log() | {"torque": log()["force"]})
+    with pytest.raises(ValueError, match=r"force: force, torque.*--columns force=") as caught:
+        io.read(path)
+    assert "log.csv" in str(caught.value)
+    assert io.read(path, columns={"force": "torque"}).num_samples == 200
+
+
+def test_given_columns_win_and_extra_roles_become_channels(tmp_path):
+    path = save(tmp_path / "log.csv", log() | {"strain": np.ones(200), "oil": np.arange(200.0)})
+    columns = {"force": "strain", "oil_level": "oil"}
+    recording = io.read(path, columns=columns)
+    np.testing.assert_array_equal(recording.force, 1.0)
+    np.testing.assert_array_equal(recording.channels["oil_level"], np.arange(200.0))
+    assert "oil" not in io.read(path).channels
+
+
+def test_an_empty_name_leaves_a_role_out(tmp_path):
+    path = save(tmp_path / "log.csv", log() | {"velocity": np.full(200, np.nan)})
+    with pytest.raises(ValueError, match="velocity column holds no number.*velocity="):
+        io.read(path)
+    assert io.read(path, columns={"velocity": ""}).velocity is None
+
+
+def test_unknown_column_lists_what_is_there(tmp_path):
+    with pytest.raises(ValueError, match="'strain' for the force.*time, position, force"):
+        io.read(save(tmp_path / "log.csv", log()), columns={"force": "strain"})
+
+
+@pytest.mark.parametrize("gone", ["time", "position", "force"])
+def test_missing_roles(tmp_path, gone):
+    columns = {name: column for name, column in log().items() if name != gone}
+    with pytest.raises(ValueError, match=f"{gone}.*--columns {gone}=NAME"):
+        io.read(save(tmp_path / "log.csv", columns | {"other": np.ones(200)}))
+
+
+def test_scale_multiplies_and_units_follow(tmp_path):
+    columns = log()
+    named = {"t": columns["time"], "pos_mm": columns["position"], "torque": columns["force"]}
+    path = save(tmp_path / "log.csv", named)
+    recording = io.read(path)
+    assert recording.unit_names == {"force": "N·m", "position": "mm"}
+    np.testing.assert_array_equal(recording.position, columns["position"])
+    recording = io.read(path, scale={"position": 0.001, "force": 2.0}, units={"force": "kN"})
+    assert recording.unit_names == {"force": "kN", "position": "m"}
+    np.testing.assert_allclose(recording.position, 0.001 * columns["position"], rtol=1e-15)
+    np.testing.assert_allclose(recording.force, 2 * columns["force"], rtol=1e-15)
+
+
+@pytest.mark.parametrize("factor", [0.0, np.nan, np.inf])
+def test_useless_scales_are_refused(tmp_path, factor):
+    with pytest.raises(ValueError, match="scale of force"):
+        io.read(save(tmp_path / "log.csv", log()), scale={"force": factor})
+    with pytest.raises(ValueError, match="scale names 'load'"):
+        io.read(tmp_path / "log.csv", scale={"load": 1.0})
+
+
+def test_milliseconds_need_a_factor(tmp_path):
+    columns = log()
+    named = {"time_ms": 1000 * columns["time"], "x": columns["position"], "f": columns["force"]}
+    path = save(tmp_path / "log.csv", named)
+    with pytest.raises(ValueError, match="--scale time=0.001"):
+        io.read(path)
+    np.testing.assert_allclose(io.read(path, scale={"time": 0.001}).time, columns["time"])
+
+
+def test_velocity_must_be_position_per_second(tmp_path):
+    columns = log()
+    named = {"t": columns["time"], "x_rad": columns["position"], "v_deg_s": columns["position"]}
+    path = save(tmp_path / "log.csv", named | {"f": columns["force"]})
+    with pytest.raises(ValueError, match="deg/s.*rad.*--scale velocity="):
+        io.read(path)
+    assert io.read(path, scale={"velocity": np.pi / 180}).num_samples == 200
+    path = save(tmp_path / "log2.csv", named | {"rpm": columns["force"]})
+    with pytest.raises(ValueError, match="rpm.*--scale velocity=0.1047"):
+        io.read(path, columns={"velocity": "rpm", "force": "x_rad"})
+
+
+# ---- clean-up ----
+
+
+def test_a_clean_log_is_left_alone(tmp_path):
+    columns = log()
+    jitter = np.random.default_rng(1).uniform(0.0, 0.9e-3, 200)
+    columns["time"] = columns["time"] + jitter
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", columns))
+    assert notes == [] and recording.num_segments == 1
+    np.testing.assert_array_equal(recording.time, columns["time"])
+
+
+def test_segments_by_column_restart_and_gap(tmp_path):
+    columns = log(300)
+    restart = np.concatenate([columns["time"][:100]] * 3)
+    labels = np.repeat(["up", "down", "up"], 100)
+    for extra in ({"segment": labels}, {"run": np.repeat([4, 2, 9], 100)}, {}):
+        recording, notes = io.read_with_notes(
+            save(tmp_path / "log.csv", columns | {"time": restart} | extra)
+        )
+        np.testing.assert_array_equal(recording.segment, np.repeat([0, 1, 2], 100))
+        assert recording.num_segments == 3
+        assert len(notes) == (not extra)
+    gap = columns["time"] + np.repeat([0.0, 0.1, 5.0], 100)
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", columns | {"time": gap}))
+    np.testing.assert_array_equal(recording.segment, np.repeat([0, 1, 2], 100))
+    assert "2 samples after a gap" in notes[0] and "row 102" in notes[0]
+
+
+def test_a_slow_segment_has_no_gaps_of_a_fast_one(tmp_path):
+    columns = log(150)
+    step = np.repeat([0.001, 0.1], [100, 50])
+    columns |= {"time": np.cumsum(step), "segment": np.repeat([0, 1], [100, 50])}
+    assert io.read(save(tmp_path / "log.npz", columns)).num_segments == 2
+
+
+def test_stamps_repeated_backward_and_stray_are_left_out(tmp_path):
+    columns = log()
+    columns["time"][50] = columns["time"][49]
+    columns["time"][80] = columns["time"][79] - 0.0005
+    columns["time"][120] = 99.0
+    columns["time"][150] = np.nan
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", columns))
+    kept = np.delete(np.arange(200), [50, 80, 120, 150])
+    np.testing.assert_array_equal(recording.time, columns["time"][kept])
+    np.testing.assert_array_equal(recording.force, columns["force"][kept])
+    assert recording.num_segments == 1
+    assert "row 152" in notes[0] and "row 122" in notes[1] and "row 52" in notes[2]
+
+
+def test_invalid_samples_are_masked_and_finite(tmp_path):
+    columns = log() | {"temperature": np.where(np.arange(200) % 10 == 0, 20.0, np.nan)}
+    columns["force"][[3, 4]] = [np.nan, np.inf]
+    columns["position"][-1] = -np.inf
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", columns))
+    np.testing.assert_array_equal(np.flatnonzero(~np.asarray(recording.mask)), [3, 4, 199])
+    for signal in (recording.force, recording.position, recording.channels["temperature"]):
+        assert np.isfinite(signal).all()
+    low, high = sorted(columns["force"][[2, 5]])
+    assert low <= float(recording.force[3]) <= high
+    assert len(notes) == 3 and "2 samples without a finite force" in " ".join(notes)
+
+
+def rotation(turn, quantum, centred, n=4000):
+    t = np.arange(n) / 1000
+    turns = 1.7 * np.sin(2 * t) + 0.9 * t
+    true = np.round(turns * turn / quantum) * quantum
+    wrapped = np.mod(true + centred * turn / 2, turn) - centred * turn / 2
+    return t, true, wrapped
+
+
+@pytest.mark.parametrize("centred", [False, True])
+@pytest.mark.parametrize(
+    "turn, quantum",
+    [(8192, 1), (4000, 1), (10000, 1), (2 * np.pi, 2 * np.pi / 8192), (360.0, 1e-3), (1e6, 1.0)],
+)
+def test_a_wrapped_position_becomes_continuous(tmp_path, turn, quantum, centred):
+    t, true, wrapped = rotation(turn, quantum, centred)
+    columns = {"time": t, "position": wrapped, "force": np.ones_like(t), "reference": wrapped}
+    recording, notes = io.read_with_notes(save(tmp_path / "log.npz", columns))
+    assert "wraps modulo" in notes[0]
+    moved = np.asarray(recording.position - recording.position[0])
+    np.testing.assert_allclose(moved, true - true[0], atol=1e-6 * turn)
+    np.testing.assert_allclose(recording.channels["reference"], recording.position)
+
+
+def test_motion_and_glitches_are_not_taken_for_wraps(tmp_path):
+    t = np.arange(2000) / 1000
+    smooth = 300 * np.sin(5 * t) + 500
+    spikes, steps, coarse = smooth.copy(), np.sign(np.sin(20 * t)), np.sin(2 * np.pi * 300 * t)
+    spikes[[400, 900, 1300]] = [4000, 0, 7000]
+    for position, warned in ((smooth, 0), (spikes, 1), (steps, 1), (coarse, 0)):
+        columns = {"time": t, "position": position, "force": np.ones_like(t)}
+        recording, notes = io.read_with_notes(save(tmp_path / "log.npz", columns))
+        np.testing.assert_array_equal(recording.position, position)
+        assert len(notes) == warned
+
+
+# ---- bad input ----
+
+
+def test_text_in_a_number_column_is_located(tmp_path):
+    columns = log() | {"force": ["1.5"] * 7 + ["E-STOP"] + ["2"] * 192}
+    with pytest.raises(ValueError, match=r"log\.csv: row 9, column 'force': 'E-STOP'"):
+        io.read(save(tmp_path / "log.csv", columns))
+
+
+BAD = {
+    "empty": ("", "empty"),
+    "header only": ("t,x,f\n", "no samples"),
+    "comments only": ("# nothing\n", "no samples"),
+    "ragged": ("t,x,f\n0,1,2\n1,2\n" + "2,3,4\n" * 20, "row 3 has 2 fields"),
+    "no header": ("0,1,2\n1,2,3\n" * 20, "column1, column2, column3"),
+    "few": ("t,x,f\n0,1,2\n1,2,3\n", "2 samples .* at least 16"),
+    "constant time": ("t,x,f\n" + "1,2,3\n" * 30, "does not change"),
+    "time runs back": (
+        "t,x,f\n" + "".join(f"{-i},2,3\n" for i in range(30)),
+        "does not increase",
+    ),
+    "all NaN": ("t,x,f\n" + "".join(f"{i},nan,3\n" for i in range(30)), "no number at all"),
+    "few valid": (
+        "t,x,f\n" + "".join(f"{i},{i if i < 9 else ''},3\n" for i in range(30)),
+        "9 valid samples",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_files(tmp_path, case):
+    text, message = BAD[case]
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(ValueError, match=message) as caught:
+        io.read(tmp_path / "log.csv")
+    assert "log.csv" in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".mat", ".npz"])
+def test_damaged_files(tmp_path, suffix):
+    (tmp_path / f"log{suffix}").write_bytes(b"PK\x03\x04 this is no such file " * 40)
+    with pytest.raises(ValueError, match=f"log{suffix}: this is no readable"):
+        io.read(tmp_path / f"log{suffix}")
+
+
+def test_absent_file_unknown_format_and_unequal_columns(tmp_path):
+    with pytest.raises(ValueError, match="no such file"):
+        io.read(tmp_path / "log.csv")
+    with pytest.raises(ValueError, match="'xlsx' is not known"):
+        io.read(tmp_path / "log.xlsx")
+    np.savez(tmp_path / "log.npz", t=np.arange(30.0), x=np.arange(31.0), f=np.arange(30.0))
+    with pytest.raises(ValueError, match="differ in length: .*x .position. 31"):
+        io.read(tmp_path / "log.npz")
+
+
+# ---- writing ----
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path):
+    path = tmp_path / "out.csv"
+    io.write_text(path, "old µ")
+    with pytest.raises(ValueError, match="columns of one length"):
+        io.write_table(path, {"a": np.ones(3), "b": np.ones(4)})
+    with pytest.raises(UnicodeEncodeError):
+        io.write_text(path, "\ud800")
+    assert path.read_text(encoding="utf-8") == "old µ"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out.csv"]
+    with pytest.raises(ValueError, match="folder"):
+        io.write_text(tmp_path / "absent" / "out.json", "{}")
+    with pytest.raises(ValueError, match="use that suffix"):
+        io.write_table(tmp_path / "out.xls", {"a": np.ones(3)})
+
+
+# ---- real recordings ----
+
+
+@needs_data
+def test_emps():
+    pytest.importorskip("scipy.io")
+    recording, notes = io.read_with_notes(DATA / "emps" / "DATA_EMPS.mat", scale={"force": 35.15})
+    assert notes == [] and recording.num_samples == 24841 and recording.velocity is None
+    assert recording.unit_names == {"force": "N", "position": "m"}
+    assert list(recording.channels) == ["reference"]
+    assert float(abs(recording.channels["reference"] - recording.position).max()) < 2e-3
+
+
+@needs_data
+@pytest.mark.parametrize("name, segments", [("spinup_uncompensated", 50), ("slow_compensated", 1)])
+def test_odrive(name, segments):
+    recording, notes = io.read_with_notes(DATA / "odrive" / f"{name}.csv")
+    assert notes == [] and recording.num_segments == segments
+    assert recording.unit_names == {"force": "A", "position": "counts"}
+
+
+@needs_data
+def test_delta_servo_and_ur10e():
+    recording, notes = io.read_with_notes(DATA / "delta_servo" / "Jm_1.csv")
+    assert notes == [] and recording.unit_names == {"force": "N·m", "position": "rad"}
+    assert list(recording.channels) == ["reference"] and recording.velocity is not None
+    recording, notes = io.read_with_notes(DATA / "ur10e" / "joint_1.csv")
+    assert notes == [] and recording.channels == {} and recording.num_segments == 1
