@@ -213,8 +213,8 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     finite = _finite(recording)
     recording = _sanitised(recording)
     limits = signals.scales(recording)
-    rows = projection.rows(recording)
-    weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording)
+    rows = projection.rows(recording, limits)
+    weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
     box = term_bounds(active, limits, dict(given))
     beta, converged, border = search(active, recording, rows, box, grid)
@@ -224,10 +224,13 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     place = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
     weighs = place and active is not term
     if weighs:
-        mass = _mass(Model(active.with_beta(beta), alpha), recording, weak)
+        mass, left = _mass(Model(active.with_beta(beta), alpha), recording, weak)
         # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
         slope = signals.local_quadratic(recording, recording.velocity, 8 * limits.interval, 8)[1]
         error = error - mass[0] * slope
+    else:
+        left = weak.target - weak.offset(active, recording)
+        left = left - weak.columns(active.with_beta(beta), recording) @ alpha
     block = uncertainty.blocks(rows.positive, rows.negative)
     matrix = uncertainty.covariance(jacobian, error, weight, block)
     if weighs:
@@ -244,7 +247,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         _verdict(finite, slipping, jnp.sum(weight) > 0, hidden, border, converged),
         rows.windows,
         rows.covered,
-        _force_error(model, recording, weak),
+        _relative(left, weak),
         minimum,
         "weak_form" if projection.keeps_inertia else "closed_windows",
     )
@@ -314,15 +317,17 @@ def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> F
 
 
 def _mass(friction: Model, recording: Recording, weak: Rows):
-    """Mass and its variance, from what the identified friction leaves of the weak form's force."""
-    push = weak.columns(Inertia(), recording)
-    left = weak.target - weak.project(friction.force(recording)[:, None])[:, 0]
+    """Mass and its variance, from what the friction leaves of the weak form's force; the rest."""
+    velocity, force = recording.velocity, friction.force(recording)
+    still = jnp.zeros_like(velocity)
+    pushed = weak.project(jnp.stack([still, force], 1), jnp.stack([velocity, still], 1))
+    push, left = pushed[:, :1], weak.target - pushed[:, 1]
     weight = weak.positive + weak.negative
     root = jnp.sqrt(weight)
     mass = least_squares(root[:, None] * push, root * left)
     block = uncertainty.blocks(weak.positive, weak.negative)
-    matrix = uncertainty.covariance(push, left - push @ mass, weight, block)
-    return mass[0], matrix[0, 0]
+    left = left - push @ mass
+    return (mass[0], uncertainty.covariance(push, left, weight, block)[0, 0]), left
 
 
 def _insert(place, mass, alpha, matrix):
@@ -332,10 +337,8 @@ def _insert(place, mass, alpha, matrix):
     return alpha, matrix.at[place, place].set(mass[1])
 
 
-def _force_error(model: Model, recording: Recording, weak: Rows):
+def _relative(left: Float[Array, " J"], weak: Rows) -> Float[Array, ""]:
     """norm(u − û)/norm(u) over the rows in motion, both passed through the same kernel."""
-    predicted = weak.columns(model.term, recording) @ model.alpha
-    left = weak.target - predicted - weak.offset(model.term, recording)
     root = jnp.sqrt(weak.moving)
     size = jnp.linalg.norm(root * weak.target)
     return jnp.linalg.norm(root * left) / jnp.where(size > 0, size, 1.0)

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .recording import Recording
-from .signals import continuous, interval, kernel, kernel_slope, scales
+from .signals import continuous, kernel, kernel_slope
 from .terms.base import AbstractTerm, Scales
 
 # Levels of velocity tried for the ends of a window, between the first and the last velocity of a
@@ -66,8 +66,8 @@ class AbstractProjection(eqx.Module):
     keeps_inertia: eqx.AbstractClassVar[bool]
 
     @abstractmethod
-    def rows(self, recording: Recording) -> Rows:
-        """The rows of a prepared recording."""
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
+        """The rows of a prepared recording with its scales."""
 
 
 class ClosedWindows(AbstractProjection):
@@ -79,11 +79,10 @@ class ClosedWindows(AbstractProjection):
 
     keeps_inertia = False
 
-    def rows(self, recording: Recording) -> Rows:
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
         """The rows of a prepared recording: its samples, weighted by the time they stand for."""
-        limits = scales(recording)
-        begin, end = _windows(recording)
-        positive, negative, slip = _slip_time(recording, limits, begin, end)
+        begin, end = _windows(recording, scales)
+        positive, negative, slip = _slip_time(recording, scales, begin, end)
         used = jnp.sum(positive) + jnp.sum(negative)
         first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
         windows = jnp.sum(first & (end > begin))
@@ -92,10 +91,10 @@ class ClosedWindows(AbstractProjection):
         return Rows(force, positive, negative, positive + negative, time, windows, covered)
 
 
-def _windows(recording: Recording) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+def _windows(recording: Recording, scales: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
     """Begin and end of the longest closed window of the segment that each sample belongs to, s."""
     time, velocity = recording.time, recording.velocity
-    together = continuous(recording, interval(recording))
+    together = continuous(recording, scales.interval)
     count = recording.num_segments or 1
     segment = recording.segment
 
@@ -135,7 +134,7 @@ def _windows(recording: Recording) -> tuple[Float[Array, " N"], Float[Array, " N
     return begin[segment], end[segment]
 
 
-def _slip_time(recording: Recording, limits: Scales, begin, end):
+def _slip_time(recording: Recording, scales: Scales, begin, end):
     """Time that each sample stands for in slip of either direction, s; and all the slip time.
 
     The trapezoidal rule on the velocity's straight line between samples, cut at the window's ends
@@ -144,7 +143,7 @@ def _slip_time(recording: Recording, limits: Scales, begin, end):
     are closed windows themselves and Lemma 1 holds on them.
     """
     time, velocity = recording.time, recording.velocity
-    together = continuous(recording, interval(recording))
+    together = continuous(recording, scales.interval)
     steps = jnp.where(together, jnp.diff(time), 0.0)
     # Where the window cuts the interval, in shares of it.
     safe = jnp.where(steps > 0, steps, 1.0)
@@ -152,7 +151,7 @@ def _slip_time(recording: Recording, limits: Scales, begin, end):
     high = jnp.clip((end[1:] - time[:-1]) / safe, 0.0, 1.0)
 
     def direction(sign):
-        height = sign * velocity - limits.slowest
+        height = sign * velocity - scales.slowest
         left, right = height[:-1], height[1:]
         cross = jnp.clip(left / jnp.where(left == right, 1.0, left - right), 0.0, 1.0)
         a = jnp.where(left > 0, 0.0, cross)
@@ -168,7 +167,7 @@ def _slip_time(recording: Recording, limits: Scales, begin, end):
         to_right = jnp.where(only_right, length, jnp.where(only_left, 0.0, to_right)) * steps
         return jnp.pad(to_left, (0, 1)) + jnp.pad(to_right, (1, 0))
 
-    moving = jnp.abs(velocity) > limits.slowest
+    moving = jnp.abs(velocity) > scales.slowest
     slip = jnp.sum(jnp.where(moving[1:] & moving[:-1], steps, 0.0))
     return direction(1.0), direction(-1.0), slip
 
@@ -216,8 +215,10 @@ def _gather(values, offset, reach, stride):
     return piece[::stride]
 
 
-def make_filter(recording: Recording, half_width: int) -> Filter:
+def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int) -> Filter:
     """The kernel of that half-width in samples on the clock of a recording.
+
+    `typical` is the sampling interval, s.
 
     **Raises:** `ValueError` if the recording is shorter than the kernel.
     """
@@ -227,7 +228,6 @@ def make_filter(recording: Recording, half_width: int) -> Filter:
             f"{recording.num_samples}; use a shorter WeakForm(half_width=...)."
         )
     stride = max(1, half_width // 2)
-    typical = interval(recording)
     steps = jnp.where(continuous(recording, typical), jnp.diff(recording.time), 0.0)
     duration = 0.5 * (jnp.pad(steps, (0, 1)) + jnp.pad(steps, (1, 0)))
     centre = _gather(recording.time, 0, half_width, stride)
@@ -257,12 +257,11 @@ class WeakForm(AbstractProjection):
     half_width: int = eqx.field(static=True)
     keeps_inertia = True
 
-    def rows(self, recording: Recording) -> Rows:
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
         """The rows of a prepared recording; weighted where the kernel lies wholly inside slip."""
-        limits = scales(recording)
-        filter_ = make_filter(recording, self.half_width)
+        filter_ = make_filter(recording, scales.interval, self.half_width)
         velocity, reach = recording.velocity, self.half_width
-        breaks = jnp.pad(jnp.cumsum(~continuous(recording, interval(recording))), (1, 0))
+        breaks = jnp.pad(jnp.cumsum(~continuous(recording, scales.interval)), (1, 0))
         whole = filter_.gather(breaks, reach) == filter_.gather(breaks, -reach)
 
         def within(slips):
@@ -270,14 +269,14 @@ class WeakForm(AbstractProjection):
             before = filter_.gather(stops - (~slips).astype(stops.dtype), -reach)
             return whole & (filter_.gather(stops, reach) == before)
 
-        spacing = filter_.stride * interval(recording)
-        positive = jnp.where(within(velocity > limits.slowest), spacing, 0.0)
-        negative = jnp.where(within(velocity < -limits.slowest), spacing, 0.0)
-        moving = (jnp.abs(velocity) > limits.slowest) & recording.mask
+        spacing = filter_.stride * scales.interval
+        positive = jnp.where(within(velocity > scales.slowest), spacing, 0.0)
+        negative = jnp.where(within(velocity < -scales.slowest), spacing, 0.0)
+        moving = (jnp.abs(velocity) > scales.slowest) & recording.mask
         sampled = filter_.apply(jnp.stack([recording.force, moving.astype(velocity.dtype)], 1), None)
         sign = jnp.sign(positive - negative)
         windows = jnp.sum((sign != jnp.pad(sign[:-1], (1, 0))) & (sign != 0))
-        slip = jnp.sum(jnp.where(moving, interval(recording), 0.0))
+        slip = jnp.sum(jnp.where(moving, scales.interval, 0.0))
         covered = (jnp.sum(positive) + jnp.sum(negative)) / jnp.where(slip > 0, slip, 1.0)
         mostly = jnp.where(whole & (sampled[:, 1] > 0.5), spacing, 0.0)
         time = filter_.gather(recording.time, 0)

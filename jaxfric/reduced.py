@@ -40,18 +40,29 @@ def part(term: AbstractTerm, nonlinear: bool) -> AbstractTerm | None:
 def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     """An orthonormal basis of the columns' span by Gram-Schmidt, repeated for rounding.
 
-    A column that the ones before it already span becomes zero.
+    A column that the ones before it already span becomes zero, and so do its derivatives: a
+    Householder QR would return an arbitrary direction and NaN derivatives there.
     """
-    basis: list[Array] = []
-    for i in range(columns.shape[-1]):
-        column, size = columns[:, i], jnp.linalg.norm(columns[:, i])
+    if columns.shape[1] == 1:
+        return _normalised(columns[:, 0], jnp.linalg.norm(columns[:, 0]))[:, None]
+
+    def append(basis, item):
+        column, place = item
+        rest = column
         for _ in range(2):
-            for other in basis:
-                column = column - other * jnp.vdot(other, column)
-        rest = jnp.linalg.norm(column)
-        new = rest > 100 * jnp.finfo(columns.dtype).eps * size
-        basis.append(jnp.where(new, column / jnp.where(new, rest, 1.0), 0.0))
-    return jnp.stack(basis, axis=1) if basis else jnp.zeros_like(columns)
+            rest = rest - basis @ (basis.T @ rest)
+        unit = _normalised(rest, jnp.linalg.norm(column))
+        return basis + unit[:, None] * place[None, :], None
+
+    places = jnp.eye(columns.shape[1], dtype=columns.dtype)
+    return jax.lax.scan(append, jnp.zeros_like(columns), (columns.T, places))[0]
+
+
+def _normalised(rest, size):
+    """A vector of length one, or zero where it is but rounding beside `size`."""
+    square = jnp.sum(rest**2)
+    new = square > (100 * jnp.finfo(rest.dtype).eps * size) ** 2
+    return jnp.where(new, rest / jnp.sqrt(jnp.where(new, square, 1.0)), 0.0)
 
 
 def project_out(

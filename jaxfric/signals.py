@@ -158,7 +158,11 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
 
 
 _choose = eqx.filter_jit(choose_half_width)
-_quadratic = eqx.filter_jit(local_quadratic)
+
+
+@eqx.filter_jit
+def _slope(recording, signal, half_width, reach):
+    return local_quadratic(recording, signal, half_width * interval(recording), reach)[1]
 
 
 def derivative(
@@ -168,7 +172,7 @@ def derivative(
 
     **Arguments:** `signal`, `(N,)`; `half_width`, in samples of the typical interval.
     """
-    return _quadratic(recording, signal, half_width * interval(recording), half_width)[1]
+    return _slope(recording, signal, jnp.asarray(half_width, signal.dtype), half_width)
 
 
 def prepare(recording: Recording, half_width: int | None = None) -> Recording:
@@ -178,7 +182,6 @@ def prepare(recording: Recording, half_width: int | None = None) -> Recording:
     position, its width chosen from resolution and noise ([`choose_half_width`][]) or given in
     samples. Samples that are not finite but valid by their mask stay: `identify` reports them.
     """
-    recording = jax.tree.map(lambda x: x, recording)
     if recording.velocity is not None:
         return recording
     if half_width is not None:
@@ -188,7 +191,7 @@ def prepare(recording: Recording, half_width: int | None = None) -> Recording:
     else:
         width = _choose(recording)
         reach = int(width)
-    velocity = _quadratic(recording, recording.position, width * interval(recording), reach)[1]
+    velocity = _slope(recording, recording.position, width, reach)
     return dataclasses.replace(recording, velocity=velocity)
 
 
@@ -232,6 +235,12 @@ def counter_velocity(
     return velocity.at[0].set(velocity[1])
 
 
+@eqx.filter_jit
+def _host_facts(recording):
+    limits = scales(recording)
+    return limits, velocity_noise(recording), continuous(recording, limits.interval)
+
+
 def kernel_half_width(recording: Recording) -> int:
     """Half-width, in samples, of the weak form's kernel for a prepared recording.
 
@@ -244,13 +253,13 @@ def kernel_half_width(recording: Recording) -> int:
     if isinstance(recording.time, jax.core.Tracer) or recording.time.ndim == 2:
         return 24
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
-    typical, noise = float(interval(recording)), float(velocity_noise(recording))
-    slipping = velocity[np.abs(velocity) > float(scales(recording).slowest)]
+    limits, noise, linked = jax.tree.map(np.asarray, _host_facts(recording))
+    slipping = velocity[np.abs(velocity) > limits.slowest]
     stretches = np.count_nonzero(np.diff(np.sign(slipping))) + (recording.num_segments or 1)
     fitting = [k for k in HALF_WIDTHS if k <= max(2, velocity.size // stretches // 8)]
-    broken = np.pad(np.cumsum(~np.asarray(continuous(recording, typical))), (1, 0))
+    broken = np.pad(np.cumsum(~linked), (1, 0))
     for width in (k for k in fitting if k >= 16):
-        weights = _derivative_weights(width, width) / typical
+        weights = _derivative_weights(width, width) / limits.interval
         whole = broken[2 * width :] == broken[: -2 * width]
         slopes = np.convolve(velocity, weights[::-1], "valid")
         power = np.sum(slopes[whole] ** 2) / max(1, np.count_nonzero(whole))
