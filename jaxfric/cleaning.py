@@ -11,6 +11,8 @@ GAP = 5.0
 MIN_SAMPLES = 16
 # Three samples are the fewest that have a central difference, that is, a velocity.
 MIN_SEGMENT = 3
+# A turn counted in fewer quanta than this is a switch, not an encoder: its jumps are no seam.
+COARSEST_ENCODER = 16
 # Turns that encoders and controllers count modulo: rad, deg and the binary resolutions.
 _TURNS = (2 * np.pi, 360.0, *(2.0**k for k in range(8, 33)))
 
@@ -225,25 +227,41 @@ def _turn(valid: np.ndarray, step: np.ndarray, jump: np.ndarray) -> float | None
     if not jump.any() or _coarse(step, jump):
         return None
     ordinary = np.max(np.abs(step[~jump]), initial=0.0)
-    quantum = np.min(np.abs(step[step != 0.0]))
-    at = np.flatnonzero(jump)
-    around = [(i - 1, i + 1) for i in at]
-    motion = [np.mean([step[j] for j in pair if 0 <= j < len(step) and not jump[j]] or [0.0])
-              for pair in around]  # fmt: skip
-    turns = np.abs(step[at] - np.array(motion))
-    turn, spread = float(np.median(turns)), float(np.ptp(turns))
-    span = np.ptp(valid)
-    slack = 2.0 * max(ordinary, quantum if quantum < 0.5 * turn else 0.0)
-    if ordinary == 0.0 or spread > slack or not span - slack <= turn <= span + slack:
+    quantum, span = np.min(np.abs(step[step != 0.0])), np.ptp(valid)
+    turns = _seams(step, jump)
+    turn, slack = float(np.median(turns)), 2.0 * ordinary
+    if ordinary == 0.0 or turn < COARSEST_ENCODER * quantum:
         return None
-    whole = bool(np.all(valid == np.round(valid)))
-    tolerance = spread + (1.0 if whole else 0.0) + min(ordinary, quantum)
-    known = [known for known in _TURNS if abs(known - turn) <= tolerance and known >= span]
-    if known:
-        return min(known, key=lambda known: abs(known - turn))
-    if len(at) < 2:
+    if np.ptp(turns) > slack or abs(turn - span) > slack:
         return None
-    return _round(turn, tolerance) if _round(turn, tolerance) >= span else turn
+    # Three standard errors: the scatter seen at the seams, or, where these are few, the scatter
+    # of the motion between two steps (1.5 times the median deviation of a normal variable).
+    scatter = np.median(np.abs(np.diff(step)[~(jump[1:] | jump[:-1])])) * 1.5
+    error = quantum + 3.0 * max(float(np.std(turns)), scatter) / np.sqrt(len(turns))
+    return _usual_turn(turn, error, span, len(turns))
+
+
+def _seams(step: np.ndarray, jump: np.ndarray) -> np.ndarray:
+    """The modulus seen at each jump: the jump less the mean of the steps before and after."""
+    ordinary = np.where(jump, 0.0, step)
+    padded, count = np.pad(ordinary, 1), np.pad((~jump).astype(float), 1)
+    motion = (padded[:-2] + padded[2:]) / np.maximum(count[:-2] + count[2:], 1.0)
+    return np.abs(step - motion)[jump]
+
+
+def _usual_turn(turn: float, error: float, span: float, seams: int) -> float | None:
+    """The usual turn, else the round number, within the error; one seam proves only the former.
+
+    A modulus is at least the range, and an error in it would grow with every turn.
+    """
+    usual = [known for known in _TURNS if abs(known - turn) <= error and known >= span]
+    rounded = _round(turn, error)
+    if usual:  # 2000 or 2048 counts? A guess would err by more with every turn.
+        rival = rounded >= span and rounded == float(f"{rounded:.0e}") != usual[0]
+        return None if rival else usual[0]
+    if seams < 2:
+        return None
+    return rounded if rounded >= span else max(turn, span)
 
 
 def _round(value: float, tolerance: float) -> float:
