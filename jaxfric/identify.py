@@ -193,7 +193,7 @@ def _check(term, projection, recording):
 def _prepare_batch(recording: Recording) -> Recording:
     if recording.velocity is not None:
         return recording
-    if isinstance(recording.position, jax.core.Tracer):
+    if signals.is_traced(recording):
         return jax.vmap(signals.prepare)(recording)
     widest = int(jnp.max(jax.vmap(signals.choose_half_width)(recording)))
     return jax.vmap(lambda r: signals.prepare(r, widest))(recording)
@@ -293,7 +293,7 @@ def _solve(term, beta, recording, rows: Rows):
     known = term.with_beta(beta)
     columns = rows.columns(known, recording)
     target = rows.target - rows.offset(known, recording)
-    root = jnp.sqrt(rows.positive + rows.negative)
+    root = reduced.root(rows.positive + rows.negative)
     alpha = least_squares(root[:, None] * columns, root * target)
     if not term.nonlinear:
         return alpha, columns, target - columns @ alpha
@@ -307,7 +307,7 @@ def _solve(term, beta, recording, rows: Rows):
 
 def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
     """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
-    scale = jnp.linalg.norm(columns, axis=0)
+    scale = reduced.root(jnp.sum(columns**2, axis=0))
     scale = jnp.where(scale > 0, scale, 1.0)
     basis = reduced.orthonormal(columns / scale[None, :])
     upper = jnp.triu(basis.T @ (columns / scale[None, :]))
@@ -323,7 +323,7 @@ def _mass(friction: Model, recording: Recording, weak: Rows):
     pushed = weak.project(jnp.stack([still, force], 1), jnp.stack([velocity, still], 1))
     push, left = pushed[:, :1], weak.target - pushed[:, 1]
     weight = weak.positive + weak.negative
-    root = jnp.sqrt(weight)
+    root = reduced.root(weight)
     mass = least_squares(root[:, None] * push, root * left)
     block = uncertainty.blocks(weak.positive, weak.negative)
     left = left - push @ mass
@@ -339,6 +339,6 @@ def _insert(place, mass, alpha, matrix):
 
 def _relative(left: Float[Array, " J"], weak: Rows) -> Float[Array, ""]:
     """norm(u − û)/norm(u) over the rows in motion, both passed through the same kernel."""
-    root = jnp.sqrt(weak.moving)
-    size = jnp.linalg.norm(root * weak.target)
-    return jnp.linalg.norm(root * left) / jnp.where(size > 0, size, 1.0)
+    root = reduced.root(weak.moving)
+    size = reduced.root(jnp.sum((root * weak.target) ** 2))
+    return reduced.root(jnp.sum((root * left) ** 2)) / jnp.where(size > 0, size, 1.0)

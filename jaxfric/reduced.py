@@ -37,6 +37,12 @@ def part(term: AbstractTerm, nonlinear: bool) -> AbstractTerm | None:
     return term if bool(term.nonlinear) is nonlinear else None
 
 
+def root(square: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """Square root with derivative zero, not infinity, at zero."""
+    positive = square > 0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, square, 1.0)), 0.0)
+
+
 def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     """An orthonormal basis of the columns' span by Gram-Schmidt, repeated for rounding.
 
@@ -44,14 +50,14 @@ def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     Householder QR would return an arbitrary direction and NaN derivatives there.
     """
     if columns.shape[1] == 1:
-        return _normalised(columns[:, 0], jnp.linalg.norm(columns[:, 0]))[:, None]
+        return _normalised(columns[:, 0], root(jnp.sum(columns**2)))[:, None]
 
     def append(basis, item):
         column, place = item
         rest = column
         for _ in range(2):
             rest = rest - basis @ (basis.T @ rest)
-        unit = _normalised(rest, jnp.linalg.norm(column))
+        unit = _normalised(rest, root(jnp.sum(column**2)))
         return basis + unit[:, None] * place[None, :], None
 
     places = jnp.eye(columns.shape[1], dtype=columns.dtype)

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
@@ -43,100 +44,112 @@ def search(
     if not term.nonlinear:
         yes = jnp.ones((), bool)
         return Found(jnp.zeros((0,), rows.target.dtype), yes, ~yes)
-    stopped = jax.lax.stop_gradient
-    frozen, frozen_rows, limits = stopped(recording), stopped(rows), stopped(box)
     logarithmic = tuple(p.logarithmic for p in term.nonlinear)
+    problem = _Problem(term, recording, rows, box, logarithmic)
+    frozen = jax.lax.stop_gradient(problem)
     sides = _sides(term)
     if sides is None:
-        start, cell = _grid_whole(term, frozen, frozen_rows, limits, logarithmic, grid)
+        start, cell = _grid_whole(frozen, grid)
     else:
-        start, cell = _grid_sides(sides, frozen, frozen_rows, limits, logarithmic, grid)
-
-    def residuals_of(recording, rows, box):
-        linear, root, target = _linear(term, recording, rows)
-        bumps = reduced.part(term, True)
-
-        def residuals(unit):
-            beta = reduced.decode(unit, box, logarithmic)
-            columns = rows.columns(bumps.with_beta(beta), recording)
-            return reduced.residual(linear, target, root[:, None] * columns)
-
-        return residuals
-
-    unit, converged = reduced.refine(residuals_of(frozen, frozen_rows, limits), start, cell)
+        start, cell = _grid_sides(sides, frozen, grid)
+    unit, converged = reduced.refine(frozen.residuals(), start, cell)
+    unit = _implicit(jax.lax.stop_gradient(unit), problem)
     border = jnp.any((unit <= 0) | (unit >= 1))
-    unit = _implicit(residuals_of, unit, (recording, rows, box), (frozen, frozen_rows, limits))
     return Found(reduced.decode(unit, box, logarithmic), converged, border)
 
 
-def _implicit(residuals_of, unit, data, frozen):
-    """The minimiser with its derivative by the data: one Newton step with a frozen Hessian.
+class _Problem(eqx.Module):
+    """Problem (L) of one recording over the unit cube of its nonlinear parameters."""
 
-    At the minimiser the step is zero, and its derivative is that of the implicit function
-    theorem, −H⁻¹ ∂(∇L)/∂data; neither grid nor iterations are differentiated.
+    term: AbstractTerm
+    recording: Recording
+    rows: Rows
+    box: Float[Array, "2 d"]
+    logarithmic: tuple[bool, ...] = eqx.field(static=True)
+
+    def columns(self, term: AbstractTerm, unit, count: int | None = None) -> Float[Array, "J k"]:
+        """The rows of the nonlinear columns of a term at a point of the unit cube."""
+        beta = reduced.decode(unit, self.box[:, :count], self.logarithmic[:count])
+        return self.rows.columns(term.with_beta(beta), self.recording)
+
+    def linear(self):
+        """Orthonormal weighted columns without β, root weights, and the weighted force less
+        their part in it."""
+        root = reduced.root(self.rows.positive + self.rows.negative)
+        columns = self.rows.columns(reduced.part(self.term, False), self.recording)
+        basis = reduced.orthonormal(root[:, None] * columns)
+        target = root * (self.rows.target - self.rows.offset(self.term, self.recording))
+        return basis, root, reduced.project_out(basis, target[:, None])[:, 0]
+
+    def residuals(self):
+        """The function from the unit cube to the residual whose squared norm is L(β)."""
+        basis, root, target = self.linear()
+        bumps = reduced.part(self.term, True)
+
+        def residuals(unit):
+            columns = root[:, None] * self.columns(bumps, unit)
+            return reduced.residual(basis, target, columns)
+
+        return residuals
+
+
+@jax.custom_jvp
+def _implicit(unit, problem: _Problem):
+    """The minimiser, with the derivative that the implicit function theorem gives it.
+
+    −H⁻¹ ∂(∇L)/∂data at the minimiser: neither the grid nor the iterations are differentiated.
+    An unknown on the border of its bounds does not move.
     """
-    unit = jax.lax.stop_gradient(unit)
+    return unit
 
-    def height(residuals, y):
-        return 0.5 * jnp.sum(residuals(y) ** 2)
 
-    gradient = jax.jacfwd(lambda y: height(residuals_of(*data), y))(unit)
-    hessian = jax.jacfwd(jax.jacfwd(lambda y: height(residuals_of(*frozen), y)))(unit)
-    free = jnp.where((unit > 0) & (unit < 1), 1.0, 0.0)
+@_implicit.defjvp
+def _(primals, tangents):
+    unit, problem = primals
+
+    def gradient(unit, problem):
+        residuals = problem.residuals()
+        return jax.jacfwd(lambda y: 0.5 * jnp.sum(residuals(y) ** 2))(unit)
+
+    _, change = jax.jvp(lambda p: gradient(unit, p), (problem,), (tangents[1],))
+    hessian = jax.jacfwd(gradient)(unit, problem)
+    free = (unit > 0) & (unit < 1) & (jnp.diagonal(hessian) > 0)
+    free = free.astype(unit.dtype)
     hessian = hessian * (free[:, None] * free[None, :]) + jnp.diag(1 - free)
-    step = jnp.linalg.solve(jax.lax.stop_gradient(hessian), gradient * free)
-    # Only the derivative of the step is wanted; its value is rounding.
-    step = step - jax.lax.stop_gradient(step)
-    return unit - jnp.where(jnp.isfinite(step), step, 0.0)
+    return unit, -jnp.linalg.solve(hessian, change * free)
 
 
-def _linear(term, recording, rows: Rows):
-    """Orthonormal weighted columns without β, root weights, and the force projected, weighted."""
-    root = jnp.sqrt(rows.positive + rows.negative)
-    columns = rows.columns(reduced.part(term, False), recording)
-    basis = reduced.orthonormal(root[:, None] * columns)
-    target = root * (rows.target - rows.offset(term, recording))
-    return basis, root, reduced.project_out(basis, target[:, None])[:, 0]
-
-
-def _grid_whole(term, recording, rows, box, logarithmic, points):
+def _grid_whole(problem: _Problem, points):
     """The best grid point over all nonlinear parameters together, in the unit cube."""
-    basis, root, target = _linear(term, recording, rows)
-    bumps = reduced.part(term, True)
-
-    def columns(unit):
-        beta = reduced.decode(unit, box, logarithmic)
-        return rows.columns(bumps.with_beta(beta), recording)
-
-    grid = reduced.grid_points(len(logarithmic), points, root.dtype)
-    costs = reduced.grid_costs(columns, grid, basis[None], target[None], root[None], False)
+    basis, root, target = problem.linear()
+    bumps = reduced.part(problem.term, True)
+    grid = reduced.grid_points(len(problem.logarithmic), points, root.dtype)
+    costs = reduced.grid_costs(
+        lambda unit: problem.columns(bumps, unit), grid, basis[None], target[None], root[None], False
+    )
     return _best(grid, costs[0])
 
 
-def _grid_sides(sides, recording, rows, box, logarithmic, points):
+def _grid_sides(sides, problem: _Problem, points):
     """The best grid points of the two directions: two rows of one batch (eq. 24).
 
     Where terms are shared (the weak form's inertia), each direction has a copy of its own here;
     the refinement that follows ties them again.
     """
     shared, inner = sides
-    roots = jnp.sqrt(jnp.stack([rows.positive, rows.negative]))
-    linear = [reduced.part(inner, False), *shared]
-    columns = [rows.columns(t, recording) for t in linear if t is not None]
-    stacked = jnp.concatenate(columns, axis=1)
+    rows, recording = problem.rows, problem.recording
+    roots = reduced.root(jnp.stack([rows.positive, rows.negative]))
+    linear = [term for term in (reduced.part(inner, False), *shared) if term is not None]
+    stacked = jnp.concatenate([rows.columns(term, recording) for term in linear], axis=1)
     bases = jax.vmap(lambda root: reduced.orthonormal(root[:, None] * stacked))(roots)
     targets = jax.vmap(
         lambda basis, root: reduced.project_out(basis, (root * rows.target)[:, None])[:, 0]
     )(bases, roots)
-    bumps = reduced.part(inner, True)
-    count = len(inner.nonlinear)
-
-    def columns_at(unit):
-        beta = reduced.decode(unit, box[:, :count], logarithmic[:count])
-        return rows.columns(bumps.with_beta(beta), recording)
-
+    bumps, count = reduced.part(inner, True), len(inner.nonlinear)
     grid = reduced.grid_points(count, points, roots.dtype)
-    costs = reduced.grid_costs(columns_at, grid, bases, targets, roots, False)
+    costs = reduced.grid_costs(
+        lambda unit: problem.columns(bumps, unit, count), grid, bases, targets, roots, False
+    )
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     return starts.reshape(-1), cells.reshape(-1)
 

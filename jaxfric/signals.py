@@ -35,6 +35,11 @@ def kernel_slope(tau: Float[Array, "*n"]) -> Float[Array, "*n"]:
     return -8 * tau * jnp.maximum(1 - tau**2, 0.0) ** 3
 
 
+def is_traced(recording: Recording) -> bool:
+    """Whether any signal is an abstract value inside jit, vmap or grad."""
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(recording))
+
+
 def interval(recording: Recording) -> Float[Array, ""]:
     """The typical sampling interval: the median over the valid steps, s."""
     steps = jnp.where(_linked(recording), jnp.diff(recording.time), jnp.nan)
@@ -186,7 +191,7 @@ def prepare(recording: Recording, half_width: int | None = None) -> Recording:
         return recording
     if half_width is not None:
         width, reach = jnp.asarray(half_width, recording.time.dtype), half_width
-    elif isinstance(recording.position, jax.core.Tracer):
+    elif is_traced(recording):
         width, reach = choose_half_width(recording, TRACED_REACH), TRACED_REACH
     else:
         width = _choose(recording)
@@ -250,7 +255,7 @@ def kernel_half_width(recording: Recording) -> int:
     slip stretch at most, so that most rows survive the reversals. Inside jit, where the
     recording has no values yet, and for a batch: 24 samples.
     """
-    if isinstance(recording.time, jax.core.Tracer) or recording.time.ndim == 2:
+    if is_traced(recording) or recording.time.ndim == 2:
         return 24
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
     limits, noise, linked = jax.tree.map(np.asarray, _host_facts(recording))
