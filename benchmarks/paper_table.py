@@ -3,7 +3,7 @@
     python benchmarks/paper_table.py [FOLDER FOR THE FIGURES]
 
 Prints the parameters (true, ACVM, AGM, ALM) of one noise-free period, then the error of the
-friction curve of (L) and (P) over noise, encoder and record. Figures need matplotlib.
+friction curve of (L) and (P) over noise, encoder and record (minutes: many compilations). Figures need matplotlib.
 """
 
 import argparse
@@ -71,13 +71,13 @@ def figures(fits, recording, folder):
     folder.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(3, 1, sharex=True, figsize=(7, 7))
     signals = {"position, m": recording.position, "velocity, m/s": recording.velocity}
-    for axis, (name, signal) in zip(axes, (signals | {"force, N": recording.force}).items()):
+    for axis, (name, signal) in zip(axes, (signals | {"force, N": recording.force}).items(), strict=True):
         axis.plot(recording.time, signal)
         axis.set_ylabel(name)
     axes[-1].set_xlabel("time, s")
     figure.savefig(folder / "paper_record.png", dpi=150)
     figure, axes = plt.subplots(1, 2, figsize=(11, 4.5))
-    for axis, speed in zip(axes, (0.19, 0.03)):
+    for axis, speed in zip(axes, (0.19, 0.03), strict=True):
         v = jnp.linspace(-speed, speed, 2000)
         axis.plot(v, scenario.machine().friction(v), "k", lw=3, alpha=0.4, label="true")
         for name, fit in fits.items():
@@ -96,9 +96,9 @@ def main():
     recording = scenario.record(scenario.machine())
     fits = {short: identify(name, recording) for short, name in MODELS.items()}
     parameter_table(fits)
-    comparison()
     if folder is not None:
         figures(fits, recording, folder)
+    comparison()
 
 
 if __name__ == "__main__":
