@@ -178,18 +178,12 @@ def refine(
     solver = BoxGaussNewton(rtol=0.0, atol=tolerance)
     box = {"lower": jnp.maximum(start - cell, 0.0), "upper": jnp.minimum(start + cell, 1.0)}
     found = optx.least_squares(
-        lambda y, _: residuals(y), solver, start, options=box, max_steps=60, throw=False
+        lambda y, _: residuals(y),
+        solver,
+        start,
+        options=box,
+        max_steps=60,
+        throw=False,
+        adjoint=optx.RecursiveCheckpointAdjoint(),
     )
-
-    def height(y):
-        return jnp.sum(residuals(y) ** 2)
-
-    better = height(found.value) <= height(start)
-    return jnp.where(better, found.value, start), found.result == optx.RESULTS.successful
-
-
-def weighted(rows, term: AbstractTerm | None, recording: Recording) -> Float[Array, "J p"]:
-    """The unweighted rows of a term's columns; no columns where there is no term."""
-    if term is None:
-        return jnp.zeros((rows.target.shape[0], 0), rows.target.dtype)
-    return rows.project(term.columns(recording), term.momentum(recording))
+    return found.value, found.result == optx.RESULTS.successful

@@ -10,23 +10,31 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 
-class _State(eqx.Module):
-    lower: Float[Array, " d"]
-    upper: Float[Array, " d"]
+class _Point(eqx.Module):
+    """An accepted point: where, its cost ½|r|², gradient Jᵀr, and Gauss-Newton matrix JᵀJ."""
+
+    place: Float[Array, " d"]
     cost: Float[Array, ""]
+    gradient: Float[Array, " d"]
+    matrix: Float[Array, "d d"]
+
+
+class _State(eqx.Module):
+    best: _Point
+    secant: Float[Array, "d d"]
     damping: Float[Array, ""]
-    step: Float[Array, ""]
     terminate: Bool[Array, ""]
 
 
 class BoxGaussNewton(optx.AbstractLeastSquaresSolver):
     """Gauss-Newton inside a box, for few unknowns and any number of residuals.
 
-    The curvature is the exact Hessian of the cost where that is positive definite, else the
-    Gauss-Newton matrix JᵀJ. With one unknown the derivative's sign shrinks the box to a bracket of its
-    root, and a step that would leave the bracket is replaced by bisection; with more unknowns a
-    Levenberg-Marquardt damping grows until the cost falls, and unknowns that are held by the box
-    are left out of the step.
+    Each step evaluates residual and Jacobian once. The curvature that JᵀJ lacks is learned from
+    the change of the gradient (symmetric rank one, as in Dennis, Gay & Welsch 1981, NL2SOL), and
+    used while the sum stays positive definite, so that convergence is superlinear although
+    the residual is large. A step that does not lower the cost is taken back and damped
+    (Levenberg & Marquardt); unknowns that the box holds are left out of it. The result is
+    never outside the box and never worse than the start, beyond rounding of the cost.
 
     `options`: `lower` and `upper`, arrays of the unknowns' shape `(d,)`.
     """
@@ -36,78 +44,68 @@ class BoxGaussNewton(optx.AbstractLeastSquaresSolver):
     norm: Callable[[Any], Any] = optx.max_norm
 
     def init(self, fn, y, args, options, f_struct, aux_struct, tags):
-        del f_struct, aux_struct, tags
-        residual, _ = fn(y, args)
-        one = jnp.ones((), y.dtype)
-        return _State(
-            options["lower"], options["upper"], 0.5 * jnp.sum(residual**2), 0 * one, one, one < 0
-        )
+        """No point yet: any cost is better than infinity."""
+        none = jnp.zeros((y.shape[0], y.shape[0]), y.dtype)
+        worst = _Point(y, jnp.asarray(jnp.inf, y.dtype), jnp.zeros_like(y), none)
+        return _State(worst, none, jnp.zeros((), y.dtype), jnp.zeros((), bool))
 
     def step(self, fn, y, args, options, state, tags):
-        del tags
+        """Evaluate at y, accept it or not, and propose the next point."""
 
         def residual(y):
-            return fn(y, args)
+            value, aux = fn(y, args)
+            return value, (value, aux)
 
-        def cost(y):
-            return 0.5 * jnp.sum(residual(y)[0] ** 2)
-
-        jacobian, aux = jax.jacfwd(residual, has_aux=True)(y)
-
-        def slope(y):
-            gradient = jax.jacfwd(cost)(y)
-            return gradient, gradient
-
-        hessian, gradient = jax.jacfwd(slope, has_aux=True)(y)
-        move = _newton(hessian, jacobian.T @ jacobian, gradient, y, state)
-        if y.shape == (1,):
-            new, lower, upper = _bracketed(y, gradient, move, state)
-            damping, value = state.damping, state.cost
-        else:
-            lower, upper = state.lower, state.upper
-            trial = jnp.clip(y + move, lower, upper)
-            value = cost(trial)
-            falls = value <= state.cost * (1 + 8 * jnp.finfo(y.dtype).eps)
-            new = jnp.where(falls, trial, y)
-            value = jnp.where(falls, value, state.cost)
-            damping = jnp.where(falls, state.damping / 8, jnp.maximum(8 * state.damping, 1e-3))
-            damping = jnp.where(falls & (damping < 1e-6), 0.0, damping)
-            move = trial - y
-        size = self.norm(new - y)
-        small = jnp.where(size > 0, size, self.norm(move)) <= self.atol + self.rtol * self.norm(y)
-        stuck = damping > 1e12
-        return new, _State(lower, upper, value, damping, size, small | stuck), aux
+        jacobian, (value, aux) = jax.jacfwd(residual, has_aux=True)(y)
+        here = _Point(y, 0.5 * jnp.sum(value**2), jacobian.T @ value, jacobian.T @ jacobian)
+        # Near the minimum a true step changes the cost by less than its rounding.
+        rounding = 64 * jnp.finfo(y.dtype).eps
+        falls = here.cost <= state.best.cost * (1 + rounding)
+        first = jnp.isinf(state.best.cost)
+        best = jax.tree.map(lambda a, b: jnp.where(falls, a, b), here, state.best)
+        learned = _rank_one(state.secant, state.best, here)
+        secant = jnp.where(falls & ~first, learned, state.secant)
+        damping = jnp.where(falls, state.damping / 8, jnp.maximum(8 * state.damping, 1e-2))
+        damping = jnp.where(damping < 1e-4, 0.0, damping)
+        lower, upper = options["lower"], options["upper"]
+        trial = jnp.clip(best.place + _newton(best, secant, damping, lower, upper), lower, upper)
+        # NaN takes no part: the point stays, and the solve ends.
+        trial = jnp.where(jnp.isfinite(trial), trial, best.place)
+        small = self.norm(trial - best.place) <= self.atol + self.rtol * self.norm(y)
+        return trial, _State(best, secant, damping, small | (damping > 1e12)), aux
 
     def terminate(self, fn, y, args, options, state, tags):
+        """Done when the next step would be smaller than the tolerance."""
         return state.terminate, optx.RESULTS.successful
 
     def postprocess(self, fn, y, aux, args, options, state, tags, result):
-        return y, aux, {}
+        """The best point, not the proposed one."""
+        return state.best.place, aux, {}
 
 
-def _newton(hessian, gauss_newton, gradient, y, state):
+def _rank_one(secant, before: _Point, after: _Point):
+    """The curvature beyond JᵀJ, corrected so that it explains the last change of the gradient."""
+    step = after.place - before.place
+    missing = after.gradient - before.gradient - after.matrix @ step - secant @ step
+    along = jnp.vdot(missing, step)
+    size = jnp.linalg.norm(missing) * jnp.linalg.norm(step)
+    clear = jnp.abs(along) > 1e-8 * size
+    update = missing[:, None] * missing[None, :] / jnp.where(clear, along, 1.0)
+    return secant + jnp.where(clear, update, 0.0)
+
+
+def _newton(point: _Point, secant, damping, lower, upper):
     """The damped step on the unknowns that the box does not hold."""
-    held = ((y <= state.lower) & (gradient > 0)) | ((y >= state.upper) & (gradient < 0))
-    free = jnp.where(held, 0.0, 1.0)
+    gradient, place = point.gradient, point.place
+    held = ((place <= lower) & (gradient > 0)) | ((place >= upper) & (gradient < 0))
+    free = jnp.where(held, 0.0, 1.0).astype(place.dtype)
     both = free[:, None] * free[None, :]
-    identity = jnp.diag(1 - free)
-    smallest = jnp.linalg.eigvalsh(hessian * both + identity * jnp.max(jnp.abs(hessian)))[0]
+    full = (point.matrix + secant) * both
+    largest = jnp.max(jnp.diagonal(point.matrix))
+    rest = jnp.diag(1 - free) * largest
     # Curvature that is not clearly positive would send the step uphill or far away.
-    convex = smallest > 1e-3 * jnp.max(jnp.diagonal(gauss_newton * both))
-    chosen = jnp.where(convex, hessian, gauss_newton)
-    scale = jnp.max(jnp.diagonal(chosen)) * jnp.eye(y.shape[0], dtype=y.dtype)
-    tiny = jnp.finfo(y.dtype).tiny
-    matrix = chosen * both + identity + (state.damping + 1e-14) * scale + tiny * jnp.eye(y.shape[0], dtype=y.dtype)
-    return -jnp.linalg.solve(matrix, gradient * free)
-
-
-def _bracketed(y, gradient, move, state):
-    """Step, lower and upper end for one unknown: Newton inside the bracket, else its middle."""
-    rises = gradient > 0
-    lower, upper = jnp.where(rises, state.lower, y), jnp.where(rises, y, state.upper)
-    trial = y + move
-    inside = (trial > lower) & (trial < upper)
-    at_end = (gradient > 0) & (y <= state.lower) | (gradient < 0) & (y >= state.upper)
-    new = jnp.where(inside, trial, 0.5 * (lower + upper))
-    new = jnp.where((gradient == 0) | at_end, y, new)
-    return new, lower, upper
+    scale = jnp.sqrt(jnp.diagonal(point.matrix) + jnp.finfo(place.dtype).tiny)
+    smallest = jnp.linalg.eigvalsh((full + rest) / (scale[:, None] * scale[None, :]))[0]
+    matrix = jnp.where(smallest > 0.05, full, point.matrix * both) + rest
+    floor = jnp.diag(damping * jnp.diagonal(point.matrix) + 1e-14 * largest + 1e-300)
+    return -jnp.linalg.solve(matrix + floor.astype(place.dtype), gradient * free)
