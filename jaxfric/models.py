@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Callable, Mapping
+from inspect import isabstract
 from typing import Any
 
 import equinox as eqx
@@ -34,10 +35,15 @@ class Model(eqx.Module):
 
     @property
     def parameters(self) -> dict[str, Float[Array, ""]]:
-        """Every parameter by name: the affine ones, then the nonlinear ones."""
-        values = list(jnp.moveaxis(self.alpha, -1, 0)) + list(jnp.moveaxis(self.term.beta(), -1, 0))
+        """Every parameter by name: the affine ones, then the nonlinear ones.
+
+        Each a scalar; of shape `(B,)` in a batch of models.
+        """
         names = [p.name for p in (*self.term.affine, *self.term.nonlinear)]
-        return dict(zip(names, values, strict=True))
+        if self.alpha.ndim > 1:
+            rows = jax.vmap(lambda row: row.parameters)(self)
+            return {name: rows[name] for name in names}
+        return dict(zip(names, [*self.alpha, *self.term.beta()], strict=True))
 
     def force(self, recording: Recording) -> Float[Array, " N"]:
         """Actuator force without the acceleration terms, N, shape `(N,)`."""
@@ -68,7 +74,8 @@ class Model(eqx.Module):
         unknown = sorted(set(values) - set(current))
         if unknown:
             raise ValueError(f"No parameter {', '.join(unknown)}; there are {', '.join(current)}.")
-        vector = jnp.stack([jnp.asarray(values.get(n, v), self.alpha.dtype) for n, v in current.items()])
+        wanted = [values.get(name, value) for name, value in current.items()]
+        vector = jnp.stack([jnp.asarray(value, self.alpha.dtype) for value in wanted])
         count = self.alpha.shape[-1]
         return Model(self.term.with_beta(vector[count:]), vector[:count], self.units)
 
@@ -85,14 +92,23 @@ class Model(eqx.Module):
     @staticmethod
     def from_dict(document: Mapping[str, Any]) -> "Model":
         """The model that [`to_dict`][] wrote; raises `ValueError` where the document is not one."""
-        if document.get("schema") != SCHEMA:
-            raise ValueError(f"Not a model document: schema is {document.get('schema')!r}, not {SCHEMA!r}.")
+        schema = document.get("schema") if isinstance(document, Mapping) else None
+        if schema != SCHEMA:
+            raise ValueError(f"Not a model document: schema is {schema!r}, not {SCHEMA!r}.")
         try:
             term = _term_from_dict(document["term"])
-            values = {name: entry["value"] for name, entry in document["parameters"].items()}
+            entries = document["parameters"].items()
+            values = {name: _number(name, entry["value"]) for name, entry in entries}
         except (KeyError, TypeError, AttributeError) as error:
-            raise ValueError(f"The model document is damaged: {error!r} is missing or misplaced.") from error
-        return from_parameters(term, values, document.get("units", {}))
+            raise ValueError(
+                f"The model document is damaged: {error!r} is missing or misplaced."
+            ) from error
+        units = document.get("units", {})
+        if not isinstance(units, Mapping) or not all(isinstance(u, str) for u in units.values()):
+            raise ValueError(
+                f"The model document's units must be names by quantity, not {units!r}."
+            )
+        return from_parameters(term, values, units)
 
     def _alphas(self):
         start, parts = 0, []
@@ -112,7 +128,9 @@ def from_parameters(
     names = [p.name for p in (*term.affine, *term.nonlinear)]
     missing = [name for name in names if name not in values]
     if missing:
-        raise ValueError(f"Missing parameter {', '.join(missing)}; the model needs {', '.join(names)}.")
+        raise ValueError(
+            f"Missing parameter {', '.join(missing)}; the model needs {', '.join(names)}."
+        )
     empty = Model(term, jnp.zeros(len(term.affine)), tuple((units or {}).items()))
     return empty.with_parameters(values)
 
@@ -175,8 +193,14 @@ def named(name: str) -> Sum:
 
 
 def load(text: str) -> Model:
-    """The model in a JSON text: a model document, or any document with one under `model`."""
-    document = json.loads(text)
+    """The model in a JSON text: a model document, or any document with one under `model`.
+
+    **Raises:** `ValueError` if the text is no JSON or holds no model.
+    """
+    try:
+        document = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ValueError(f"Not a model document: this is no JSON: {error}.") from error
     if isinstance(document, dict) and document.get("schema") != SCHEMA and "model" in document:
         document = document["model"]
     return Model.from_dict(document)
@@ -188,8 +212,12 @@ def _summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
 
 def _term_to_dict(term: AbstractTerm) -> dict[str, Any]:
     """The structure of a term: its class, and every field that is not a nonlinear parameter."""
-    searched = {p.name for p in term.nonlinear} if not isinstance(term, Sum | Directional) else set()
-    fields = {f.name: getattr(term, f.name) for f in dataclasses.fields(term) if f.name not in searched}
+    searched = (
+        {p.name for p in term.nonlinear} if not isinstance(term, Sum | Directional) else set()
+    )
+    fields = {
+        f.name: getattr(term, f.name) for f in dataclasses.fields(term) if f.name not in searched
+    }
     return {"type": type(term).__name__, **{name: _plain(value) for name, value in fields.items()}}
 
 
@@ -201,15 +229,31 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, jax.Array) else value
 
 
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"Parameter {name} of the model document must be a number, not {value!r}.")
+    return float(value)
+
+
 def _term_from_dict(document: Mapping[str, Any]) -> AbstractTerm:
     kind = document["type"]
     found = getattr(laws, kind, None)
-    if not (isinstance(found, type) and issubclass(found, AbstractTerm)):
-        raise ValueError(f"The model document names a term {kind!r} that jaxfric.terms does not have.")
+    if not (isinstance(found, type) and issubclass(found, AbstractTerm)) or isabstract(found):
+        raise ValueError(
+            f"The model document names a term {kind!r} that jaxfric.terms does not have."
+        )
     fields = {name: _revived(value) for name, value in document.items() if name != "type"}
     if found is Directional:
-        return Directional(fields["positive"], fields["negative"])
+        return Directional(_term(fields["positive"]), _term(fields["negative"]))
+    if found is Sum:
+        return Sum(tuple(_term(part) for part in fields["terms"]))
     return found(**fields)
+
+
+def _term(value: Any) -> AbstractTerm:
+    if not isinstance(value, AbstractTerm):
+        raise TypeError(f"a term where {value!r} stands")
+    return value
 
 
 def _revived(value: Any) -> Any:

@@ -12,8 +12,8 @@ from jaxtyping import Array, Bool, Float, Int
 from .units import SI
 
 
-def _array(value):
-    return None if value is None else jnp.asarray(value)
+def _flags(value):
+    return None if value is None else jnp.asarray(value).astype(bool)
 
 
 def _whole(value):
@@ -52,7 +52,7 @@ class Recording(eqx.Module):
     force: Float[Array, " N"] = eqx.field(converter=_signal)
     position: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
     velocity: Float[Array, " N"] | None = eqx.field(converter=_signal, default=None)
-    mask: Bool[Array, " N"] | None = eqx.field(converter=_array, default=None)
+    mask: Bool[Array, " N"] | None = eqx.field(converter=_flags, default=None)
     segment: Int[Array, " N"] | None = eqx.field(converter=_whole, default=None)
     channels: dict[str, Float[Array, " N"]] = eqx.field(default_factory=dict)
     units: tuple[tuple[str, str], ...] = eqx.field(
@@ -62,10 +62,11 @@ class Recording(eqx.Module):
     num_segments: int | None = eqx.field(static=True, default=None)
 
     def __post_init__(self):
+        shape = np.shape(self.time)  # equinox converts the fields afterwards: it may be a list
         if self.mask is None:
-            self.mask = jnp.ones(self.time.shape, bool)
+            self.mask = jnp.ones(shape, bool)
         if self.segment is None:
-            self.segment = jnp.zeros(self.time.shape, jnp.int32)
+            self.segment = jnp.zeros(shape, jnp.int32)
             self.num_segments = 1
         elif self.num_segments is None:
             if isinstance(self.segment, jax.core.Tracer):
@@ -140,7 +141,9 @@ def stack(recordings: Sequence[Recording]) -> Recording:
     segments = max(recording.num_segments or 1 for recording in recordings)
     leaves = [jax.tree.leaves(pad(recording, length)) for recording in recordings]
     structure = jax.tree.structure(_anonymous(first, segments))
-    return jax.tree.unflatten(structure, [jnp.stack(column) for column in zip(*leaves, strict=True)])
+    return jax.tree.unflatten(
+        structure, [jnp.stack(column) for column in zip(*leaves, strict=True)]
+    )
 
 
 def _kinds(recording: Recording) -> Mapping[str, object]:
