@@ -1,0 +1,53 @@
+"""What the README and CONTRIBUTING show works as shown."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import jax
+import pytest
+
+import jaxfric
+
+ROOT = Path(__file__).parents[1]
+PAGES = ["README.md", "CONTRIBUTING.md"]
+
+
+def blocks(page, language):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_python_blocks_run_one_after_the_other(page, capsys):
+    code = blocks(page, "python")
+    assert code, f"{page} shows no code"
+    if "jf.identify" in "".join(code) and not callable(getattr(jaxfric, "identify", None)):
+        pytest.skip("the package does not export its public names yet")
+    space = {"__name__": page}
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        for block in code:  # as a user has it: without the strict settings of the tests
+            exec(compile(block, page, "exec"), space)
+    assert capsys.readouterr().out.strip()
+
+
+def test_links_lead_to_files():
+    for page in PAGES:
+        for link in re.findall(r"\]\((?!https?:)([^)#]+)", (ROOT / page).read_text("utf-8")):
+            assert (ROOT / link).exists(), f"{page} links to {link}, which is not there"
+
+
+def test_the_extras_named_are_those_there_are():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extras = extras["optional-dependencies"]
+    commands = "".join(blocks("README.md", "sh"))
+    for extra in re.findall(r"\.\[(\w+)\]", commands):
+        assert extra in extras
+    assert "pytest" in commands
+    assert "jaxfric demo" in commands
+
+
+def test_paths_and_options_of_the_commands_exist():
+    for command in blocks("CONTRIBUTING.md", "sh"):
+        for path in re.findall(r"(?<!\S)((?:tests|benchmarks|\.ci)(?:/[\w./]+)?)", command):
+            assert (ROOT / path).exists(), path
