@@ -12,7 +12,7 @@ from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
 from .recording import Recording
 from .search import search
-from .terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
+from .terms.base import AbstractTerm, Scales, Sum, bounds as term_bounds, summands
 from .terms.inertia import Inertia
 from .uncertainty import Estimate
 from .units import spell
@@ -216,7 +216,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     rows = projection.rows(recording, limits)
     weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
-    box = term_bounds(active, limits, dict(given))
+    box = term_bounds(active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given))
     beta, converged, border = search(active, recording, rows, box, grid)
     alpha, jacobian, error = _solve(active, beta, recording, rows)
     weight = rows.positive + rows.negative
@@ -251,6 +251,17 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         minimum,
         "weak_form" if projection.keeps_inertia else "closed_windows",
     )
+
+
+def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, ""]:
+    """The speed that both directions reach in the rows, m/s: no faster bump could be seen."""
+    velocity = recording.velocity
+    used = jnp.stack([rows.positive > 0, rows.negative > 0])
+    if rows.target.shape != velocity.shape:
+        used = jnp.stack([velocity > 0, velocity < 0])
+    top = jnp.max(jnp.where(used, jnp.abs(velocity)[None, :], 0.0), axis=1)
+    both = jnp.min(jnp.where(top > limits.slowest, top, jnp.inf))
+    return jnp.maximum(jnp.minimum(limits.fastest, both), 4 * limits.slowest)
 
 
 def _verdict(finite, slipping, closed, hidden, border, converged):

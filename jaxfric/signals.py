@@ -243,22 +243,24 @@ def counter_velocity(
 @eqx.filter_jit
 def _host_facts(recording):
     limits = scales(recording)
-    return limits, velocity_noise(recording), continuous(recording, limits.interval)
+    position = recording.position
+    jitter = jnp.zeros(()) if position is None else white_noise(recording, position)
+    return limits, velocity_noise(recording), jitter, continuous(recording, limits.interval)
 
 
 def kernel_half_width(recording: Recording) -> int:
     """Half-width, in samples, of the weak form's kernel for a prepared recording.
 
     The shortest of the ladder, from 16 samples (on which the kernel's quadrature is exact to
-    rounding), for which the velocity's noise is under a thousandth of the power of the
-    acceleration column, so that it biases the mass by under 0.1 %; but an eighth of the typical
+    rounding), for which the noise of velocity or position is under a thousandth of the power of
+    the acceleration column, so that it biases the mass by under 0.1 %; but an eighth of the typical
     slip stretch at most, so that most rows survive the reversals. Inside jit, where the
     recording has no values yet, and for a batch: 24 samples.
     """
     if is_traced(recording) or recording.time.ndim == 2:
         return 24
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
-    limits, noise, linked = jax.tree.map(np.asarray, _host_facts(recording))
+    limits, noise, jitter, linked = jax.tree.map(np.asarray, _host_facts(recording))
     slipping = velocity[np.abs(velocity) > limits.slowest]
     stretches = np.count_nonzero(np.diff(np.sign(slipping))) + (recording.num_segments or 1)
     fitting = [k for k in HALF_WIDTHS if k <= max(2, velocity.size // stretches // 8)]
@@ -268,6 +270,7 @@ def kernel_half_width(recording: Recording) -> int:
         whole = broken[2 * width :] == broken[: -2 * width]
         slopes = np.convolve(velocity, weights[::-1], "valid")
         power = np.sum(slopes[whole] ** 2) / max(1, np.count_nonzero(whole))
-        if noise**2 * np.sum(weights**2) <= 1e-3 * power:
+        rough = np.diff(weights, prepend=0.0, append=0.0) / limits.interval
+        if max(noise**2 * np.sum(weights**2), jitter**2 * np.sum(rough**2)) <= 1e-3 * power:
             return width
     return fitting[-1]

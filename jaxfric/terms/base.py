@@ -208,7 +208,7 @@ class Sum(AbstractTerm):
         return sum((term.offset(recording) for term in self.terms), jnp.zeros_like(recording.time))
 
     def beta(self) -> Float[Array, " d"]:
-        return jnp.concatenate([term.beta() for term in self.terms])
+        return _joined([term.beta() for term in self.terms])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "Sum":
         counts = [len(term.nonlinear) for term in self.terms]
@@ -263,7 +263,7 @@ class Directional(AbstractTerm):
         return jnp.where(v > 0, positive, jnp.where(v < 0, negative, jnp.zeros_like(v)))
 
     def beta(self) -> Float[Array, " d"]:
-        return jnp.concatenate([self.positive.beta(), self.negative.beta()])
+        return _joined([self.positive.beta(), self.negative.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "Directional":
         positive, negative = _split(
@@ -317,7 +317,13 @@ def _batched(body, recording: Recording) -> Float[Array, "N p"]:
 
 
 def _vector(values) -> Float[Array, " k"]:
-    return jnp.stack([jnp.asarray(value) for value in values]) if len(values) else jnp.zeros((0,))
+    """Numbers as one vector; a batch of each as a batch of vectors."""
+    return jnp.stack([jnp.asarray(v) for v in values], axis=-1) if values else jnp.zeros((0,))
+
+
+def _joined(vectors) -> Float[Array, " k"]:
+    full = [vector for vector in vectors if vector.shape[-1]]
+    return jnp.concatenate(full, axis=-1) if full else jnp.zeros((0,))
 
 
 def _split(vector, counts):
