@@ -116,12 +116,16 @@ def describe(name: str) -> tuple[str | None, str | None]:
 
 
 def assign(
-    names: Iterable[str], columns: Mapping[str, str | None] | None, source: str
+    names: Iterable[str],
+    columns: Mapping[str, str | None] | None,
+    source: str,
+    set_point: bool = False,
 ) -> dict[str, str]:
     """Role to column name: what the user says first, then the usual synonyms.
 
     **Arguments:** `names`, the columns that the file has; `columns`, role to column name as
-    given by the user, where an empty name leaves the role out; `source`, for messages.
+    given by the user, where an empty name leaves the role out; `source`, for messages;
+    `set_point`, whether the time and a reference, a position or a force are enough.
 
     **Raises:** `ValueError` if a named column is absent, if two columns stand for one role, or
     if time, force, or both position and velocity are missing.
@@ -140,6 +144,8 @@ def assign(
                 f"Say which: --columns {role}={found[0]} (columns={{{role!r}: {found[0]!r}}})."
             )
         chosen[role] = found[0]
+    if set_point and "time" in chosen and {"reference", "position", "force"} & set(chosen):
+        return chosen
     _check_needed(chosen, names, source)
     return chosen
 

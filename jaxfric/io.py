@@ -59,15 +59,19 @@ def read_with_notes(
     scale: Mapping[str, float] | None = None,
     units: Mapping[str, str] | None = None,
     format: str | None = None,
+    set_point: bool = False,
 ) -> tuple[Recording, list[str]]:
     """[`read`][] together with one plain sentence for each thing that was put in order.
+
+    With `set_point` the file may hold what an axis should do instead of what it did: time and a
+    reference, a position or a force are enough, and a force that is absent is zero.
 
     Row numbers in the notes count lines in a CSV file and samples, from 1, in the other formats.
     """
     path, source = Path(path), str(path)
     scale, units = dict(scale or {}), dict(units or {})
     table = load(path, format)
-    chosen = names.assign(table.columns, columns, source)
+    chosen = names.assign(table.columns, columns, source, set_point)
     _check_arguments(chosen, scale, units, source)
     names.check_per_second(chosen, scale, source)
     signals = {
@@ -78,6 +82,10 @@ def read_with_notes(
     rows = np.arange(len(signals["time"])) + table.first_row
     tidy = clean(signals, segment, rows, source)
     scaled = {role: signal * scale.get(role, 1.0) for role, signal in tidy.signals.items()}
+    if set_point:
+        scaled.setdefault("force", np.zeros_like(scaled["time"]))
+        if not {"position", "velocity"} & set(scaled):
+            scaled["position"] = scaled.get("reference", np.zeros_like(scaled["time"]))
     notes = table.notes + tidy.notes
     scaled["time"] = _exact_time(scaled["time"], tidy.segment, notes, source)
     recording = Recording(
@@ -163,7 +171,15 @@ def write_text(path: str | os.PathLike, text: str) -> None:
 
     **Raises:** `ValueError` if the folder is absent or cannot be written to.
     """
-    _write_whole(Path(path), lambda file: file.write(text.encode("utf-8")))
+    write_bytes(path, text.encode("utf-8"))
+
+
+def write_bytes(path: str | os.PathLike, content: bytes) -> None:
+    """Write a file whole or not at all.
+
+    **Raises:** `ValueError` if the folder is absent or cannot be written to.
+    """
+    _write_whole(Path(path), lambda file: file.write(content))
 
 
 def write_table(path: str | os.PathLike, columns: Mapping[str, object]) -> None:
