@@ -1,4 +1,4 @@
-"""Named sums of terms, and a sum with its parameters: what identification returns and the rest uses."""
+"""Named sums of terms, and a sum with its parameters, which identification returns."""
 
 import dataclasses
 import json
@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from . import terms as laws
 from .recording import Recording
-from .terms.base import AbstractTerm, Directional, Parameter, Sum
+from .terms.base import AbstractTerm, Directional, Sum
 from .units import SI, spell
 
 SCHEMA = "jaxfric.model/1"

@@ -14,9 +14,9 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 ORDER = """
     units recording terms signals models
     columns delimited cleaning tables io
-    refine projections reduced uncertainty search identify select online fleet
-    control plant predict simulate scenario
-    explain concealed report export cli __main__
+    refine projections reduced uncertainty search identification selection online fleet
+    control plant prediction simulation scenario
+    explain concealed documents tabulate report export cli __main__
 """.split()
 
 FILES = sorted(PACKAGE.rglob("*.py"))
@@ -95,6 +95,19 @@ def test_importing_changes_no_setting_of_jax():
         "    if m.name.split('.')[1] not in ('__main__', 'cli'): importlib.import_module(m.name)\n"
         "after = dict(jax.config.values)\n"
         "assert before == after, {k for k in after if before.get(k) != after[k]}\n"
+    )
+
+
+def test_public_names_stay_what_they_are_whatever_was_imported_before():
+    """A submodule of the same name (identify) must not hide the function."""
+    run(
+        "import importlib, pkgutil, types, jaxfric\n"
+        "for m in pkgutil.walk_packages(jaxfric.__path__, 'jaxfric.'):\n"
+        "    if m.name.split('.')[1] != '__main__': importlib.import_module(m.name)\n"
+        "modules = ('models', 'scenario', 'signals', 'terms')\n"
+        "hidden = [n for n in jaxfric.__all__ if n not in modules\n"
+        "          and isinstance(getattr(jaxfric, n), types.ModuleType)]\n"
+        "assert not hidden, hidden\n"
     )
 
 
