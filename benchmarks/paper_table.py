@@ -14,7 +14,7 @@ import jax.numpy as jnp
 
 from jaxfric import scenario
 from jaxfric.control import Encoder
-from jaxfric.identify import identify
+from jaxfric.identification import identify
 from problem_p import curve_distance, curve_error, problem_p
 
 MODELS = {"ACVM": "coulomb-viscous", "AGM": "gaussian", "ALM": "lorentzian"}

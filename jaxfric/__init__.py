@@ -10,27 +10,27 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import models as models, scenario as scenario, signals as signals, terms as terms
     from .control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
-    from .identify import Identified as Identified, Result as Result, identify as identify
+    from .identification import Identified as Identified, Result as Result, identify as identify
     from .io import read as read
     from .models import Model as Model
-    from .predict import predict as predict
+    from .prediction import predict as predict
     from .projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
     from .recording import Recording as Recording, pad as pad, stack as stack
-    from .select import Selection as Selection, select as select
-    from .simulate import simulate as simulate
+    from .selection import Selection as Selection, select as select
+    from .simulation import simulate as simulate
     from .uncertainty import Estimate as Estimate
 
 _MODULES = ("models", "scenario", "signals", "terms")
 _NAMES = {
     "control": ("PD", "PID", "Cascade", "Encoder"),
-    "identify": ("Identified", "Result", "identify"),
+    "identification": ("Identified", "Result", "identify"),
     "io": ("read",),
     "models": ("Model",),
-    "predict": ("predict",),
+    "prediction": ("predict",),
     "projections": ("ClosedWindows", "WeakForm"),
     "recording": ("Recording", "pad", "stack"),
-    "select": ("Selection", "select"),
-    "simulate": ("simulate",),
+    "selection": ("Selection", "select"),
+    "simulation": ("simulate",),
     "uncertainty": ("Estimate",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

@@ -148,7 +148,7 @@ def _padded(recording):
 
 def _identify(arguments) -> int:
     from . import documents, tabulate
-    from .identify import identify
+    from .identification import identify
     from .models import named
     from .projections import ClosedWindows, WeakForm
     from .signals import kernel_half_width, prepare
@@ -187,7 +187,7 @@ def _identify(arguments) -> int:
 
 
 def _best(recording) -> str:
-    from .select import select
+    from .selection import select
 
     return select(recording).name
 
@@ -255,7 +255,7 @@ def _predict(arguments) -> int:
     import numpy as np
 
     from .io import write_table
-    from .predict import predict
+    from .prediction import predict
 
     model = _load(arguments.model)
     recording, _ = _read(arguments.file, arguments)
@@ -271,7 +271,7 @@ def _predict(arguments) -> int:
 
 def _simulate(arguments) -> int:
     from .io import write_table
-    from .simulate import simulate
+    from .simulation import simulate
 
     model = _load(arguments.model)
     controller = _controller(arguments.controller)
@@ -312,7 +312,7 @@ def _demo(arguments) -> int:
     import jax
 
     from . import documents, scenario, tabulate
-    from .identify import identify
+    from .identification import identify
     from .io import write_table, write_text
 
     folder = Path(arguments.out)

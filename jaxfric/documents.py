@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .identify import Identified, Result, result_names
+from .identification import Identified, Result, result_names
 from .recording import Recording
 
 IDENTIFICATION = "jaxfric.identification/1"

@@ -26,7 +26,7 @@ from . import models
 from .control import PD, Encoder
 from .models import Model
 from .recording import Recording
-from .simulate import simulate
+from .simulation import simulate
 
 TRUTH = {
     "inertia": 5.0,
@@ -68,7 +68,7 @@ def record(
 
     **Arguments:** `model`, an axis (the gains are those for [`machine`][]); `periods`, how many;
     `encoder`, `force_noise` (standard deviation, N) and `key` as in
-    [`simulate`][jaxfric.simulate.simulate]; `sample_rate`, Hz.
+    [`simulate`][jaxfric.simulation.simulate]; `sample_rate`, Hz.
 
     **Returns:** `periods * PERIOD * sample_rate + 1` samples, with the set-point as the channel
     `reference`. The force of a sample is the mean of what was held before and after it, which is

@@ -18,7 +18,7 @@ import pytest
 
 from jaxfric import models, scenario
 from jaxfric.control import Encoder
-from jaxfric.identify import identify
+from jaxfric.identification import identify
 
 HELPER = pathlib.Path(__file__).parents[1] / "benchmarks" / "problem_p.py"
 spec = importlib.util.spec_from_file_location("problem_p", HELPER)

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from jaxfric import models, terms
 from jaxfric.control import PD, PID, Cascade, Encoder
-from jaxfric.predict import predict
+from jaxfric.prediction import predict
 from jaxfric.recording import Recording
-from jaxfric.simulate import default_substeps, simulate
+from jaxfric.simulation import default_substeps, simulate
 from jaxfric.terms import AbstractLaw, Parameter
 from jaxfric.units import INERTIA, STIFFNESS
 

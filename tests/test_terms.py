@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 from jaxtyping import Array, Float
 
 from jaxfric import models, terms
-from jaxfric.identify import identify
+from jaxfric.identification import identify
 from jaxfric.recording import Recording, stack
 from jaxfric.terms import (
     Coulomb,

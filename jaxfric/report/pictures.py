@@ -1,11 +1,13 @@
 """The picture of an identification: the friction curve over the data, and force against time."""
 
+from pathlib import Path
+
 import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
-from ..identify import Identified
-from ..predict import predict
+from ..identification import Identified
+from ..prediction import predict
 from ..recording import Recording
 from ..units import VELOCITY, spell
 
@@ -50,7 +52,7 @@ def _curve(axes, found: Identified, recording: Recording) -> None:
     axes.axvline(0, color="0.8", lw=0.8, zorder=0)
     axes.set_xlabel(f"velocity [{spell(VELOCITY, units)}]")
     axes.set_ylabel(f"friction force [{units['force']}]")
-    axes.set_title(f"Friction of {recording.source or 'the axis'}")
+    axes.set_title(f"Friction of {Path(recording.source).name or 'the axis'}")
     axes.legend(fontsize=8)
 
 

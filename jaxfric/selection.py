@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from . import signals
-from .identify import identify
+from .identification import identify
 from .models import Model, named
 from .projections import WeakForm
 from .recording import Recording
