@@ -157,8 +157,14 @@ def _too_open(found: Identified) -> bool:
 
 
 def _width(projection: AbstractProjection | None, recording: Recording) -> int:
-    given = isinstance(projection, WeakForm)
-    return projection.half_width if given else signals.kernel_half_width(recording)
+    """Half-width of the weak form's kernel; a batch shares the median of a few rows' widths."""
+    if isinstance(projection, WeakForm):
+        return projection.half_width
+    if recording.time.ndim == 1 or signals.is_traced(recording):
+        return signals.kernel_half_width(recording)
+    count = recording.time.shape[0]
+    some = [jax.tree.map(lambda x, i=i: x[i], recording) for i in range(0, count, -(-count // 8))]
+    return sorted(signals.kernel_half_width(row) for row in some)[len(some) // 2]
 
 
 def _structure(model) -> AbstractTerm:
@@ -247,7 +253,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         _verdict(finite, slipping, jnp.sum(weight) > 0, hidden, border, converged),
         rows.windows,
         rows.covered,
-        _relative(left, weak),
+        weak.relative(left),
         minimum,
         "weak_form" if projection.keeps_inertia else "closed_windows",
     )
@@ -346,10 +352,3 @@ def _insert(place, mass, alpha, matrix):
     alpha = jnp.insert(alpha, place, mass[0])
     matrix = jnp.insert(jnp.insert(matrix, place, 0.0, axis=0), place, 0.0, axis=1)
     return alpha, matrix.at[place, place].set(mass[1])
-
-
-def _relative(left: Float[Array, " J"], weak: Rows) -> Float[Array, ""]:
-    """norm(u − û)/norm(u) over the rows in motion, both passed through the same kernel."""
-    root = reduced.root(weak.moving)
-    size = reduced.root(jnp.sum((root * weak.target) ** 2))
-    return reduced.root(jnp.sum((root * left) ** 2)) / jnp.where(size > 0, size, 1.0)

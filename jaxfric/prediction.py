@@ -2,11 +2,13 @@
 
 import dataclasses
 
+import equinox as eqx
 import jax
 from jaxtyping import Array, Float
 
 from . import signals
 from .models import Model
+from .projections import WeakForm
 from .recording import Recording
 
 
@@ -30,3 +32,21 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     momentum = model.momentum(prepared)
     rate = signals.local_quadratic(prepared, momentum, span, reach)[1]
     return model.force(prepared) + rate
+
+
+def relative_error(model: Model, recording: Recording, half_width: int | None = None) -> Float[Array, ""]:
+    """norm(u − û)/norm(u) of a model on a recording, both passed through the same kernel.
+
+    The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.
+    `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
+    """
+    prepared = signals.prepare(recording)
+    width = half_width or signals.kernel_half_width(prepared)
+    return _relative_error(model, prepared, width)
+
+
+@eqx.filter_jit
+def _relative_error(model, recording, width):
+    rows = WeakForm(width).rows(recording, signals.scales(recording))
+    left = rows.target - rows.columns(model.term, recording) @ model.alpha
+    return rows.relative(left - rows.offset(model.term, recording))

@@ -60,6 +60,12 @@ class Rows(eqx.Module):
         return self.project(term.offset(recording)[:, None])[:, 0]
 
 
+    def relative(self, left: Float[Array, " J"]) -> Float[Array, ""]:
+        """norm(left)/norm(force) over the rows in motion: the relative force error."""
+        ours, whole = (jnp.sum(self.moving * x**2) for x in (left, self.target))
+        return jnp.sqrt(ours / jnp.where(whole > 0, whole, 1.0))
+
+
 class AbstractProjection(eqx.Module):
     """A way to rows; `keeps_inertia` tells whether acceleration is in them."""
 

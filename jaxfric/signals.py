@@ -255,9 +255,9 @@ def kernel_half_width(recording: Recording) -> int:
     rounding), for which the noise of velocity or position is under a thousandth of the power of
     the acceleration column, so that it biases the mass by under 0.1 %; but an eighth of the typical
     slip stretch at most, so that most rows survive the reversals. Inside jit, where the
-    recording has no values yet, and for a batch: 24 samples.
+    recording has no values yet: 24 samples.
     """
-    if is_traced(recording) or recording.time.ndim == 2:
+    if is_traced(recording):
         return 24
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
     limits, noise, jitter, linked = jax.tree.map(np.asarray, _host_facts(recording))

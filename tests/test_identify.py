@@ -1,0 +1,226 @@
+"""Identification on known machines, in batches, through jit and grad, and on real recordings."""
+
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxfric as jf
+from jaxfric.identification import result_names
+from jaxfric.prediction import relative_error
+
+RATE = 1000.0
+
+
+def motion(seconds=8.0, rate=RATE):
+    """A multisine that starts and ends at rest, with its exact derivatives."""
+    t = np.arange(int(seconds * rate) + 1) / rate
+    base = 2 * np.pi / seconds
+    parts = ((2, 0.06, 0.3), (5, 0.03, 1.1), (9, 0.012, 2.0))
+    x = sum(a * np.sin(n * base * t + p) for n, a, p in parts)
+    v = sum(a * n * base * np.cos(n * base * t + p) for n, a, p in parts)
+    a = sum(-b * (n * base) ** 2 * np.sin(n * base * t + p) for n, b, p in parts)
+    return t, x, v, a
+
+
+TRUE = {"coulomb+": 12.0, "viscous+": 30.0, "stribeck_force+": 4.0, "stribeck_velocity+": 0.02}
+TRUE |= {"coulomb-": 11.0, "viscous-": 36.0, "stribeck_force-": 5.0, "stribeck_velocity-": 0.03}
+
+
+def machine(name="gaussian", mass=3.0):
+    term = jf.models.named(name)
+    known = {"inertia": mass} | TRUE
+    wanted = [p.name for p in (*term.affine, *term.nonlinear)]
+    return jf.models.from_parameters(term, {n: known[n] for n in wanted})
+
+
+def recording(model, noise=0.0, seed=0, **arguments):
+    t, x, v, a = motion(**arguments)
+    bare = jf.Recording(time=t, force=0 * t, position=x, velocity=v)
+    force = np.asarray(model.force(bare)) + float(model.parameters["inertia"]) * a
+    force = force + noise * np.random.default_rng(seed).normal(size=t.size)
+    return dataclasses.replace(bare, force=force)
+
+
+@pytest.mark.parametrize("name", ["coulomb-viscous", "gaussian", "lorentzian", "exponential"])
+@pytest.mark.parametrize("projection", [jf.ClosedWindows(), jf.WeakForm(16)])
+def test_recovers_a_known_machine(name, projection):
+    model = machine(name)
+    found = jf.identify(name, recording(model), projection=projection)
+    assert result_names()[int(found.result._value)] == "successful"
+    for key, value in model.parameters.items():
+        # The kernel averages over 32 ms, in which the bump's curve is not a straight line, and the
+        # window's cut is good to the square of the sampling interval.
+        np.testing.assert_allclose(found.parameters[key].value, value, rtol=0.03, err_msg=key)
+
+
+def test_inertia_is_left_out_whatever_it_is():
+    light, heavy = (jf.identify("gaussian", recording(machine(mass=m))) for m in (0.0, 300.0))
+    for key in TRUE:
+        np.testing.assert_allclose(
+            light.parameters[key].value, heavy.parameters[key].value, rtol=2e-2, err_msg=key
+        )
+    assert abs(heavy.parameters["inertia"].value - 300) < 0.3
+
+
+def test_a_batch_keeps_failures_in_their_row():
+    good = recording(machine(), noise=0.1)
+    nan = dataclasses.replace(good, force=good.force.at[100].set(jnp.nan))
+    still = dataclasses.replace(good, velocity=jnp.full_like(good.velocity, 0.1))
+    ramp = dataclasses.replace(good, velocity=0.05 + 0.01 * good.time)
+    rest = dataclasses.replace(good, velocity=jnp.zeros_like(good.velocity))
+    batch = jf.stack([good, nan, still, ramp, rest, good])
+    found = jf.identify("gaussian", batch, projection=jf.ClosedWindows())
+    names = [result_names()[int(i)] for i in found.result._value]
+    assert names[:2] == ["successful", "not_finite"]
+    assert names[2] in ("not_excited", "on_border")
+    assert names[3] == "open_windows"
+    assert names[4] == "no_slip"
+    alone = jf.identify("gaussian", good, projection=jf.ClosedWindows())
+    for key, estimate in alone.parameters.items():
+        both = found.parameters[key]
+        # The mass is found with a kernel whose width the rows of a batch share.
+        tolerance = 1e-3 if key == "inertia" else 1e-6
+        pair = both.value[jnp.array([0, 5])]
+        np.testing.assert_allclose(pair, estimate.value, rtol=tolerance, err_msg=key)
+    assert bool(jnp.isnan(found.parameters["coulomb+"].value[1]))
+    assert bool(jnp.isinf(found.parameters["coulomb+"].standard_error[1]))
+
+
+def test_throw_raises_with_the_diagnosis():
+    good = recording(machine())
+    rest = dataclasses.replace(good, velocity=jnp.zeros_like(good.velocity))
+    with pytest.raises(ValueError, match="never slips"):
+        jf.identify("coulomb-viscous", rest, throw=True)
+    with pytest.raises(ValueError, match="Row 1.*never slips"):
+        jf.identify("coulomb-viscous", jf.stack([good, rest]), throw=True)
+
+
+def test_one_direction_alone_leaves_the_other_infinitely_uncertain():
+    full = recording(machine("coulomb-viscous"), noise=0.1)
+    forward = dataclasses.replace(full, mask=full.velocity > 0)
+    found = jf.identify("coulomb-viscous", forward, projection=jf.WeakForm(16))
+    assert result_names()[int(found.result._value)] == "not_excited"
+    assert bool(jnp.isinf(found.parameters["coulomb-"].standard_error))
+    assert bool(jnp.isfinite(found.parameters["coulomb+"].standard_error))
+
+
+class Squared(jf.terms.AbstractLaw):
+    """Drag: F = c v |v|."""
+
+    affine = (jf.terms.Parameter("drag"),)
+
+    def law(self, sample):
+        return (sample.velocity * jnp.abs(sample.velocity),)
+
+
+class Spring(jf.terms.AbstractLaw):
+    """Spring: F = k x."""
+
+    affine = (jf.terms.Parameter("stiffness"),)
+    coordinates = frozenset({"position"})
+
+    def law(self, sample):
+        return (sample.position,)
+
+
+def test_closed_windows_are_refused_to_terms_of_position():
+    term = jf.models.coulomb_viscous() + Spring()
+    log = recording(machine("coulomb-viscous"))
+    with pytest.raises(ValueError, match="position.*WeakForm"):
+        jf.identify(term, log, projection=jf.ClosedWindows())
+    log = dataclasses.replace(log, force=log.force + 40.0 * log.position)
+    found = jf.identify(term, log)
+    assert found.projection == "weak_form"
+    np.testing.assert_allclose(found.parameters["stiffness"].value, 40.0, rtol=5e-3)
+    np.testing.assert_allclose(found.parameters["inertia"].value, 3.0, rtol=5e-3)
+
+
+def test_a_missing_signal_is_named():
+    log = dataclasses.replace(recording(machine()), position=None)
+    with pytest.raises(ValueError, match="needs position"):
+        jf.identify(jf.models.coulomb_viscous() + Spring(), log)
+
+
+def test_a_term_of_the_users_own_is_identified_in_closed_windows():
+    log = recording(machine("coulomb-viscous"))
+    log = dataclasses.replace(log, force=log.force + 25.0 * log.velocity * jnp.abs(log.velocity))
+    found = jf.identify(jf.models.coulomb_viscous() + Squared(), log)
+    assert found.projection == "closed_windows"
+    np.testing.assert_allclose(found.parameters["drag"].value, 25.0, rtol=1e-2)
+
+
+@pytest.mark.parametrize("name", ["coulomb-viscous", "gaussian"])
+def test_gradients_are_those_of_finite_differences(name):
+    log = recording(machine(name), noise=0.2, seconds=4.0)
+    direction = jnp.sin(3 * log.time) * jnp.sign(log.velocity)
+
+    def parameters(amount):
+        moved = eqx.tree_at(lambda r: r.force, log, log.force + amount * direction)
+        found = jf.identify(name, moved, projection=jf.ClosedWindows())
+        return jnp.concatenate([found.model.alpha[1:], found.model.term.beta()])
+
+    forward, reverse = jax.jacfwd(parameters)(0.0), jax.jacrev(parameters)(0.0)
+    step = 1e-3
+    traced = jax.jit(parameters)
+    difference = (traced(step) - traced(-step)) / (2 * step)
+    np.testing.assert_allclose(forward, difference, rtol=2e-4, atol=1e-6)
+    np.testing.assert_allclose(forward, reverse, rtol=1e-8, atol=1e-10)
+    if name == "coulomb-viscous":
+        # Affine models: the derivative is the fit of the direction itself (eq. 19).
+        moved = dataclasses.replace(log, force=direction)
+        closed = jf.identify(name, moved, projection=jf.ClosedWindows()).model.alpha[1:]
+        np.testing.assert_allclose(forward, closed, rtol=1e-8, atol=1e-10)
+
+
+def test_vmap_and_jit_agree_with_a_plain_call():
+    log = recording(machine(), noise=0.1, seconds=4.0)
+    forces = jnp.stack([log.force, 1.1 * log.force])
+
+    def cost(force):
+        moved = eqx.tree_at(lambda r: r.force, log, force)
+        return jf.identify("gaussian", moved, projection=jf.ClosedWindows()).model.alpha[1:]
+
+    np.testing.assert_allclose(jax.vmap(cost)(forces)[1], 1.1 * cost(log.force), rtol=1e-6)
+    np.testing.assert_allclose(jax.jit(cost)(log.force), cost(log.force), rtol=1e-9)
+
+
+def test_bounds_hold_and_the_border_is_reported():
+    log = recording(machine(), noise=0.05)
+    bounds = {"stribeck_velocity": (0.05, 0.09)}
+    found = jf.identify("gaussian", log, bounds=bounds)
+    assert result_names()[int(found.result._value)] == "on_border"
+    for sign in "+-":
+        value = float(found.parameters[f"stribeck_velocity{sign}"].value)
+        assert 0.05 * (1 - 1e-12) <= value <= 0.09 * (1 + 1e-12)
+
+
+def emps(folder, name="DATA_EMPS"):
+    return jf.read(
+        folder / "emps" / f"{name}.mat",
+        columns={"force": "vir", "position": "qm"},
+        scale={"force": 35.1506},
+    )
+
+
+def test_emps_friction_without_mass_and_acceleration(data_folder):
+    """Published, with mass and acceleration: Janot, Gautier & Brunot 2019."""
+    found = jf.identify("coulomb-viscous", emps(data_folder), projection=jf.ClosedWindows())
+    published = {"viscous+": 166.7061, "coulomb+": 20.1440}
+    published |= {"viscous-": 240.4236, "coulomb-": 20.6277}
+    for key, value in published.items():
+        np.testing.assert_allclose(found.parameters[key].value, value, rtol=0.01, err_msg=key)
+    np.testing.assert_allclose(found.parameters["inertia"].value, 95.1089, rtol=0.005)
+
+
+def test_emps_weak_form_and_the_pulses(data_folder):
+    identification, validation = emps(data_folder), emps(data_folder, "DATA_EMPS_PULSES")
+    directional = jf.identify("coulomb-viscous", identification, projection=jf.WeakForm(16))
+    np.testing.assert_allclose(directional.parameters["inertia"].value, 95.15, rtol=0.005)
+    assert float(directional.force_error) <= 0.032
+    symmetric = jf.identify("symmetric-coulomb-viscous", identification, projection=jf.WeakForm(16))
+    assert float(symmetric.force_error) <= 0.042
+    assert float(relative_error(symmetric.model, validation, half_width=16)) <= 0.061
