@@ -3,7 +3,8 @@
     python benchmarks/paper_table.py [FOLDER FOR THE FIGURES]
 
 Prints the parameters (true, ACVM, AGM, ALM) of one noise-free period, then the error of the
-friction curve of (L) and (P) over noise, encoder and record (minutes: many compilations). Figures need matplotlib.
+friction curve of (L) and (P) over noise, encoder and record (minutes: many
+compilations). Figures need matplotlib.
 """
 
 import argparse
@@ -11,11 +12,11 @@ import pathlib
 
 import jax
 import jax.numpy as jnp
+from problem_p import curve_distance, curve_error, problem_p
 
 from jaxfric import scenario
 from jaxfric.control import Encoder
 from jaxfric.identification import identify
-from problem_p import curve_distance, curve_error, problem_p
 
 MODELS = {"ACVM": "coulomb-viscous", "AGM": "gaussian", "ALM": "lorentzian"}
 LOW, HIGH = 0.002, 0.18
@@ -71,7 +72,9 @@ def figures(fits, recording, folder):
     folder.mkdir(parents=True, exist_ok=True)
     figure, axes = plt.subplots(3, 1, sharex=True, figsize=(7, 7))
     signals = {"position, m": recording.position, "velocity, m/s": recording.velocity}
-    for axis, (name, signal) in zip(axes, (signals | {"force, N": recording.force}).items(), strict=True):
+    for axis, (name, signal) in zip(
+        axes, (signals | {"force, N": recording.force}).items(), strict=True
+    ):
         axis.plot(recording.time, signal)
         axis.set_ylabel(name)
     axes[-1].set_xlabel("time, s")

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from . import models as models, scenario as scenario, signals as signals, terms as terms
     from .control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
-    from .identification import Identified as Identified, Result as Result, identify as identify
+    from .identification import identify as identify
+    from .identified import Identified as Identified, Result as Result
     from .io import read as read
     from .models import Model as Model
     from .prediction import predict as predict
@@ -23,7 +24,8 @@ if TYPE_CHECKING:
 _MODULES = ("models", "scenario", "signals", "terms")
 _NAMES = {
     "control": ("PD", "PID", "Cascade", "Encoder"),
-    "identification": ("Identified", "Result", "identify"),
+    "identification": ("identify",),
+    "identified": ("Identified", "Result"),
     "io": ("read",),
     "models": ("Model",),
     "prediction": ("predict",),

@@ -1,4 +1,4 @@
-"""What closes the loop around an axis: position controllers and the encoder that they see through."""
+"""What closes the loop around an axis: position controllers and the encoder that they read."""
 
 from abc import abstractmethod
 from typing import Any, NamedTuple
@@ -48,7 +48,9 @@ class AbstractController(eqx.Module):
         """
         force, following = self.law(memory, feedback)
         limited = jnp.clip(force, -self.limit, self.limit)
-        kept = jax.tree.map(lambda old, new: jnp.where(force == limited, new, old), memory, following)
+        kept = jax.tree.map(
+            lambda old, new: jnp.where(force == limited, new, old), memory, following
+        )
         return limited, kept
 
 

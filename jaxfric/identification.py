@@ -8,91 +8,17 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from . import reduced, signals, uncertainty
+from .identified import Identified, Result, raise_unless_successful
 from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
 from .recording import Recording
 from .search import search
 from .terms.base import AbstractTerm, Scales, Sum, bounds as term_bounds, summands
 from .terms.inertia import Inertia
-from .uncertainty import Estimate
-from .units import spell
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
 LEAST_COVERED = 0.5
-
-
-class Result(eqx.Enumeration):
-    """How an identification ended; each member's text is the diagnosis and the remedy."""
-
-    successful = "The parameters were identified."
-    on_border = (
-        "The cost is least on the border of a nonlinear parameter's bounds, so that parameter is "
-        "not determined. Excite slower motion (the Stribeck velocity must lie well inside the "
-        "speeds that the axis slips at), give bounds, or use a model without the bump."
-    )
-    not_converged = (
-        "The refinement stopped before it converged; the parameters are those of the best point "
-        "found, never worse than the grid's. Usually the bump hardly shows in the data."
-    )
-    not_excited = (
-        "Condition (15) fails: some columns are linearly dependent on this recording, so that the "
-        "parameters with infinite standard error are not determined. Move in both directions and "
-        "over a range of speeds, neither constant speed nor rest alone."
-    )
-    open_windows = (
-        "Condition (14) fails: no window with equal end velocities lets the axis slip. Record "
-        "until the axis returns to a velocity that it had before (rest, or a whole period), or "
-        "use the weak form."
-    )
-    no_slip = (
-        "The axis never slips: its speed does not rise above its noise. Check the velocity or the "
-        "column that it was read from, or move faster."
-    )
-    not_finite = (
-        "The signals contain NaN or infinity at samples marked valid. Mask those samples "
-        "(Recording(mask=...)) or repair the log."
-    )
-
-
-class Identified(eqx.Module):
-    """What identification found.
-
-    - `model`: the sum with its parameters, a [`Model`][jaxfric.models.Model].
-    - `covariance`: of `names`, shape `(P, P)`; infinite where not visible.
-    - `result`: a member of [`Result`][].
-    - `windows`, `covered`: how many windows were used and which share of the slip time they hold.
-    - `force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia included.
-    - `cost`: the minimum of the reduced cost, N²·s.
-    - `projection`: "closed_windows" or "weak_form".
-    """
-
-    model: Model
-    covariance: Float[Array, "P P"]
-    result: Result
-    windows: Float[Array, ""]
-    covered: Float[Array, ""]
-    force_error: Float[Array, ""]
-    cost: Float[Array, ""]
-    projection: str = eqx.field(static=True)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters, affine ones first."""
-        term = self.model.term
-        return tuple(p.name for p in (*term.affine, *term.nonlinear))
-
-    @property
-    def parameters(self) -> dict[str, Estimate]:
-        """Each parameter's value, standard error and unit, by name."""
-        term, units = self.model.term, dict(self.model.units)
-        errors = jnp.sqrt(jnp.diagonal(self.covariance, axis1=-2, axis2=-1))
-        freedom = uncertainty.BLOCKS - (len(self.names) + 1) // 2
-        values = self.model.parameters
-        return {
-            p.name: Estimate(values[p.name], errors[..., i], spell(p.dimension, units), freedom)
-            for i, p in enumerate((*term.affine, *term.nonlinear))
-        }
 
 
 def identify(
@@ -135,19 +61,6 @@ def identify(
     if throw:
         raise_unless_successful(found)
     return found
-
-
-def raise_unless_successful(found: Identified) -> None:
-    """Raises `ValueError` with the diagnosis of the first row that is not successful."""
-    for i, index in enumerate(jnp.ravel(found.result._value)):
-        if index != Result.successful._value:
-            row = f"Row {i}: " if jnp.ndim(found.result._value) else ""
-            raise ValueError(row + Result[getattr(Result, result_names()[int(index)])])
-
-
-def result_names() -> tuple[str, ...]:
-    """Names of the members of [`Result`][], in the order of their numbers."""
-    return tuple(Result._name_to_item)
 
 
 def _too_open(found: Identified) -> bool:
@@ -222,7 +135,9 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     rows = projection.rows(recording, limits)
     weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
-    box = term_bounds(active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given))
+    box = term_bounds(
+        active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
+    )
     beta, converged, border = search(active, recording, rows, box, grid)
     alpha, jacobian, error = _solve(active, beta, recording, rows)
     weight = rows.positive + rows.negative
@@ -234,13 +149,16 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
         slope = signals.local_quadratic(recording, recording.velocity, 8 * limits.interval, 8)[1]
         error = error - mass[0] * slope
+        pull = _open_ends(jacobian[:, : alpha.size], slope, rows.moving) * mass[0]
     else:
+        pull = jnp.zeros_like(alpha)
         left = weak.target - weak.offset(active, recording)
         left = left - weak.columns(active.with_beta(beta), recording) @ alpha
     block = uncertainty.blocks(rows.positive, rows.negative)
     matrix = uncertainty.covariance(jacobian, error, weight, block)
     if weighs:
         alpha, matrix = _insert(place[0], mass, alpha, matrix)
+        pull = jnp.insert(pull, place[0], 0.0)
     nothing = ~finite | (jnp.sum(weight) <= 0)
     alpha = jnp.where(nothing, jnp.nan, alpha)
     matrix = jnp.where(nothing, jnp.inf, matrix)
@@ -255,6 +173,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         rows.covered,
         weak.relative(left),
         minimum,
+        pull,
         "weak_form" if projection.keeps_inertia else "closed_windows",
     )
 
@@ -345,6 +264,12 @@ def _mass(friction: Model, recording: Recording, weak: Rows):
     block = uncertainty.blocks(weak.positive, weak.negative)
     left = left - push @ mass
     return (mass[0], uncertainty.covariance(push, left, weight, block)[0, 0]), left
+
+
+def _open_ends(columns, slope, weight):
+    """D⁻¹ ∫ v̇ g dt over all slip: what Lemma 1 makes zero where the end velocities are equal."""
+    root = reduced.root(weight)
+    return least_squares(root[:, None] * columns, root * slope)
 
 
 def _insert(place, mass, alpha, matrix):

@@ -1,4 +1,4 @@
-"""The axis as a dynamical system: what the terms say at one state, and one step exact about sticking."""
+"""The axis as a dynamical system: the terms at one state, and one step exact about sticking."""
 
 from typing import Any
 

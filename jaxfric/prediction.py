@@ -34,7 +34,9 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     return model.force(prepared) + rate
 
 
-def relative_error(model: Model, recording: Recording, half_width: int | None = None) -> Float[Array, ""]:
+def relative_error(
+    model: Model, recording: Recording, half_width: int | None = None
+) -> Float[Array, ""]:
     """norm(u − û)/norm(u) of a model on a recording, both passed through the same kernel.
 
     The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.

@@ -59,7 +59,6 @@ class Rows(eqx.Module):
         """The rows of a term's known part f0, `(J,)`."""
         return self.project(term.offset(recording)[:, None])[:, 0]
 
-
     def relative(self, left: Float[Array, " J"]) -> Float[Array, ""]:
         """norm(left)/norm(force) over the rows in motion: the relative force error."""
         ours, whole = (jnp.sum(self.moving * x**2) for x in (left, self.target))
@@ -93,8 +92,10 @@ class ClosedWindows(AbstractProjection):
         first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
         windows = jnp.sum(first & (end > begin))
         covered = used / jnp.where(slip > 0, slip, 1.0)
+        moving = jnp.where(jnp.abs(recording.velocity) > scales.slowest, scales.interval, 0.0)
+        moving = jnp.where(recording.mask, moving, 0.0)
         force, time = recording.force, recording.time
-        return Rows(force, positive, negative, positive + negative, time, windows, covered)
+        return Rows(force, positive, negative, moving, time, windows, covered)
 
 
 def _windows(recording: Recording, scales: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
@@ -279,7 +280,9 @@ class WeakForm(AbstractProjection):
         positive = jnp.where(within(velocity > scales.slowest), spacing, 0.0)
         negative = jnp.where(within(velocity < -scales.slowest), spacing, 0.0)
         moving = (jnp.abs(velocity) > scales.slowest) & recording.mask
-        sampled = filter_.apply(jnp.stack([recording.force, moving.astype(velocity.dtype)], 1), None)
+        sampled = filter_.apply(
+            jnp.stack([recording.force, moving.astype(velocity.dtype)], 1), None
+        )
         sign = jnp.sign(positive - negative)
         windows = jnp.sum((sign != jnp.pad(sign[:-1], (1, 0))) & (sign != 0))
         slip = jnp.sum(jnp.where(moving, scales.interval, 0.0))

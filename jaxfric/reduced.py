@@ -14,7 +14,6 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from .recording import Recording
 from .refine import BoxGaussNewton
 from .terms.base import AbstractTerm, Directional, Sum
 
@@ -27,7 +26,7 @@ GRID_POINTS = (128, 64, 24, 12, 8)
 
 
 def part(term: AbstractTerm, nonlinear: bool) -> AbstractTerm | None:
-    """The summands with (or without) nonlinear parameters, wrappers kept; `None` if there are none."""
+    """The summands with (or without) nonlinear parameters, wrappers kept; else `None`."""
     if isinstance(term, Sum):
         kept = tuple(p for p in (part(t, nonlinear) for t in term.terms) if p is not None)
         return Sum(kept) if kept else None
@@ -71,9 +70,7 @@ def _normalised(rest, size):
     return jnp.where(new, rest / jnp.sqrt(jnp.where(new, square, 1.0)), 0.0)
 
 
-def project_out(
-    basis: Float[Array, "J q"], values: Float[Array, "J k"]
-) -> Float[Array, "J k"]:
+def project_out(basis: Float[Array, "J q"], values: Float[Array, "J k"]) -> Float[Array, "J k"]:
     """Values less their part in the span of an orthonormal basis, twice for rounding."""
     for _ in range(2):
         values = values - basis @ (basis.T @ values)
@@ -177,7 +174,7 @@ def refine(
     tolerance = math.sqrt(float(jnp.finfo(start.dtype).eps)) * 1e-4
     solver = BoxGaussNewton(rtol=0.0, atol=tolerance)
     box = {"lower": jnp.maximum(start - cell, 0.0), "upper": jnp.minimum(start + cell, 1.0)}
-    found = optx.least_squares(
+    found: optx.Solution = optx.least_squares(
         lambda y, _: residuals(y),
         solver,
         start,

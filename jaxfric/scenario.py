@@ -88,7 +88,7 @@ def record(
     channels = {"reference": goal, "reference_velocity": goal_velocity}
     clock = Recording(time, jnp.zeros_like(time), goal, source="scenario", channels=channels)
     mass = TRUTH["inertia"]
-    loop = PD(mass * BANDWIDTH**2, 2 * mass * BANDWIDTH)
+    loop = PD(kp=mass * BANDWIDTH**2, kd=2 * mass * BANDWIDTH)  # type: ignore[call-arg]
     run = simulate(model, clock, loop, encoder=encoder, key=key)
     return _noisy(_last(run, first), force_noise, key)
 

@@ -15,7 +15,8 @@ from .terms.base import AbstractTerm, Directional, Sum, summands
 
 class Found(NamedTuple):
     """The nonlinear parameters β `(d,)`, whether the refinement converged, and whether β lies on
-    the border of its bounds."""
+    the border of its bounds.
+    """
 
     beta: Float[Array, " d"]
     converged: Bool[Array, ""]
@@ -74,7 +75,8 @@ class _Problem(eqx.Module):
 
     def linear(self):
         """Orthonormal weighted columns without β, root weights, and the weighted force less
-        their part in it."""
+        their part in it.
+        """
         root = reduced.root(self.rows.positive + self.rows.negative)
         columns = self.rows.columns(reduced.part(self.term, False), self.recording)
         basis = reduced.orthonormal(root[:, None] * columns)
@@ -125,7 +127,12 @@ def _grid_whole(problem: _Problem, points):
     bumps = reduced.part(problem.term, True)
     grid = reduced.grid_points(len(problem.logarithmic), points, root.dtype)
     costs = reduced.grid_costs(
-        lambda unit: problem.columns(bumps, unit), grid, basis[None], target[None], root[None], False
+        lambda unit: problem.columns(bumps, unit),
+        grid,
+        basis[None],
+        target[None],
+        root[None],
+        False,
     )
     return _best(grid, costs[0])
 

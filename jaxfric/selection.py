@@ -22,7 +22,8 @@ STRETCHES = 4
 
 class Candidate(NamedTuple):
     """One model's standing: number of parameters, held-out mean-square force residual of each
-    fold, N², and the root of their mean relative to the force, dimensionless."""
+    fold, N², and the root of their mean relative to the force, dimensionless.
+    """
 
     name: str
     parameters: int

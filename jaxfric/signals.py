@@ -262,8 +262,9 @@ def kernel_half_width(recording: Recording) -> int:
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
     limits, noise, jitter, linked = jax.tree.map(np.asarray, _host_facts(recording))
     slipping = velocity[np.abs(velocity) > limits.slowest]
-    stretches = np.count_nonzero(np.diff(np.sign(slipping))) + (recording.num_segments or 1)
-    fitting = [k for k in HALF_WIDTHS if k <= max(2, int(np.sum(recording.mask)) // stretches // 8)]
+    stretches = int(np.count_nonzero(np.diff(np.sign(slipping)))) + (recording.num_segments or 1)
+    longest = int(np.count_nonzero(recording.mask)) // stretches // 8
+    fitting = [k for k in HALF_WIDTHS if k <= max(2, longest)]
     broken = np.pad(np.cumsum(~linked), (1, 0))
     for width in (k for k in fitting if k >= 16):
         weights = _derivative_weights(width, width) / limits.interval

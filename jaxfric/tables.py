@@ -85,7 +85,7 @@ def _read_mat(path: Path) -> Table:
 
 def _hdf5(group: Any) -> dict[str, Any]:
     """Variables of a version 7.3 file; MATLAB's axes are in reverse order there."""
-    content = {}
+    content: dict[str, Any] = {}
     for key, item in group.items():
         if hasattr(item, "keys"):
             if not key.startswith("#"):

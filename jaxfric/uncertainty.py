@@ -3,7 +3,8 @@
 The residual of an axis is far from white, so that independent-sample formulas promise too much.
 Here blocks of the record vote: the covariance is the sandwich A⁻¹ (Σ_b s_b s_bᵀ) A⁻¹ with s_b the
 score summed over block b (Liang & Zeger 1986), each freed of its own pull on the fit (the
-delete-one-block jackknife, CR3 of Bell & McCaffrey 2002). What the record cannot see is infinitely uncertain.
+delete-one-block jackknife, CR3 of Bell & McCaffrey 2002). What the record cannot see is infinitely
+uncertain.
 """
 
 from statistics import NormalDist
@@ -91,7 +92,9 @@ def _gram(white: Float[Array, "J p"], block: Int[Array, " J"]) -> Float[Array, "
     return jnp.moveaxis(jax.lax.map(column, white.T), 0, 1)
 
 
-def _without_own_pull(votes: Float[Array, "b p"], gram: Float[Array, "b p p"]) -> Float[Array, "b p"]:
+def _without_own_pull(
+    votes: Float[Array, "b p"], gram: Float[Array, "b p p"]
+) -> Float[Array, "b p"]:
     """The votes that blocks would cast had they not taken part in the fit: (I − A_b)⁻¹ s_b.
 
     A block that alone determines a direction pulls the fit onto itself and shows no residual

@@ -1,4 +1,4 @@
-"""Units: every parameter has a dimension in (force, position, time); the recording says what those are called.
+"""Units: a parameter has a dimension in (force, position, time); a recording says their names.
 
 Nothing here computes with units. Numbers stay in the recording's own units throughout; this
 module only writes the unit beside the number.

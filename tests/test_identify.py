@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification import result_names
+from jaxfric.identified import result_names
 from jaxfric.prediction import relative_error
 
 RATE = 1000.0

@@ -32,7 +32,9 @@ def acceleration(log):
 @given(st.floats(-50, 50))
 def test_adding_acceleration_changes_no_friction_parameter(mass):
     """Lemma 1. The quadrature of the window's cuts is of second order in the interval."""
-    moved, inertia = friction(dataclasses.replace(BASE, force=BASE.force + mass * acceleration(BASE)))
+    moved, inertia = friction(
+        dataclasses.replace(BASE, force=BASE.force + mass * acceleration(BASE))
+    )
     for key, value in REFERENCE.items():
         assert abs(moved[key] - value) <= 2e-3 * abs(mass) * (1 if "coulomb" in key else 10), key
     np.testing.assert_allclose(inertia, MASS + mass, rtol=0, atol=1e-3 * (1 + abs(mass)))
@@ -66,7 +68,12 @@ def test_units_do_not_matter(force, position, time):
             velocity=log.velocity * x / t,
         )
         moved, _ = friction(scaled, name)
-        factors = {"coulomb": f, "stribeck_force": f, "viscous": f * t / x, "stribeck_velocity": x / t}
+        factors = {
+            "coulomb": f,
+            "stribeck_force": f,
+            "viscous": f * t / x,
+            "stribeck_velocity": x / t,
+        }
         for key, value in reference.items():
             expected = value * factors[key.rstrip("+-")]
             np.testing.assert_allclose(moved[key], expected, rtol=1e-5, err_msg=key)

@@ -69,7 +69,10 @@ def test_the_record_is_one_closed_period(period):
     assert abs(v[0] - v[-1]) < 1e-6 * np.max(np.abs(v))
     np.testing.assert_allclose(period.time[-1], scenario.PERIOD)
     assert np.mean(v == 0.0) > 0.01  # it sticks at reversals
-    force, friction = np.asarray(period.force), np.asarray(scenario.machine().friction(period.velocity))
+    force, friction = (
+        np.asarray(period.force),
+        np.asarray(scenario.machine().friction(period.velocity)),
+    )
     inertial = scenario.TRUTH["inertia"] * np.gradient(v, 1 / 5000.0)
     slip = np.abs(v) > 0.002
     assert np.linalg.norm((force - friction - inertial)[slip]) < 0.005 * np.linalg.norm(force[slip])

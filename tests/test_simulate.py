@@ -9,8 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from jaxfric import models, terms
 from jaxfric.control import PD, PID, Cascade, Encoder
@@ -100,7 +99,9 @@ def test_deceleration_follows_the_closed_form_with_order_two():
 
 
 def test_coulomb_friction_stops_at_the_exact_place_whatever_the_step():
-    model = models.from_parameters(terms.Inertia() + terms.Coulomb(), {"inertia": 2.0, "coulomb": 3.0})
+    model = models.from_parameters(
+        terms.Inertia() + terms.Coulomb(), {"inertia": 2.0, "coulomb": 3.0}
+    )
     for rate in (7.0, 1000.0):
         got = simulate(model, driven(clock(2.0, rate)), initial=(0.0, 1.0), substeps=1)
         # v0² M / (2 Fc)
@@ -190,7 +191,9 @@ def test_gradient_matches_finite_differences(smooth):
     slopes = jax.jit(jax.grad(cost, argnums=(0, 1, 2)))(*at)
     for i, slope in enumerate(slopes):
         step = 1e-6 * at[i]
-        ends = [cost(*(a + s * step if i == j else a for j, a in enumerate(at))) for s in (1.0, -1.0)]
+        ends = [
+            cost(*(a + s * step if i == j else a for j, a in enumerate(at))) for s in (1.0, -1.0)
+        ]
         np.testing.assert_allclose(slope, (ends[0] - ends[1]) / (2 * step), rtol=1e-4)
 
 
@@ -284,7 +287,9 @@ def test_predict_gives_back_the_force_of_the_simulation():
 def test_what_cannot_be_simulated_is_refused():
     time = clock(0.1, 100.0)
     with pytest.raises(ValueError, match="inertia"):
-        light = models.from_parameters(terms.Coulomb() + terms.Viscous(), {"coulomb": 1.0, "viscous": 1.0})
+        light = models.from_parameters(
+            terms.Coulomb() + terms.Viscous(), {"coulomb": 1.0, "viscous": 1.0}
+        )
         simulate(light, driven(time))
     with pytest.raises(ValueError, match="two samples"):
         simulate(stribeck_axis(), driven(time[:1]))
@@ -297,11 +302,17 @@ def test_what_cannot_be_simulated_is_refused():
 
 
 def _emps():
-    root = pathlib.Path(os.environ.get("JAXFRIC_DATA", pathlib.Path(__file__).parents[2] / "shared/data"))
+    root = pathlib.Path(
+        os.environ.get("JAXFRIC_DATA", pathlib.Path(__file__).parents[2] / "shared/data")
+    )
     if not (root / "emps/DATA_EMPS.mat").exists():
         pytest.skip("the EMPS recording is not here (JAXFRIC_DATA)")
     loadmat = pytest.importorskip("scipy.io").loadmat
-    data = {k: np.ravel(v).astype(float) for k, v in loadmat(root / "emps/DATA_EMPS.mat").items() if k[0] != "_"}
+    data = {
+        k: np.ravel(v).astype(float)
+        for k, v in loadmat(root / "emps/DATA_EMPS.mat").items()
+        if k[0] != "_"
+    }
     return data
 
 
@@ -309,11 +320,15 @@ def test_emps_in_closed_loop_meets_the_published_simulation_error():
     """Published parameters and controller: position 0.0138 %, force 5.85 % (Janot et al. 2019)."""
     data = _emps()
     gain = data["gtau"][0]
-    recording = Recording(data["t"], gain * data["vir"], data["qm"], channels={"reference": data["qg"]})
+    recording = Recording(
+        data["t"], gain * data["vir"], data["qm"], channels={"reference": data["qg"]}
+    )
     term = terms.Inertia() + terms.Coulomb() + terms.Viscous() + terms.Offset()
     values = {"inertia": 95.1089, "viscous": 203.5034, "coulomb": 20.3935, "offset": -3.1648}
     out = simulate(models.from_parameters(term, values), recording, Cascade(160.18, 243.45 * gain))
-    position = jnp.linalg.norm(out.position - recording.position) / jnp.linalg.norm(recording.position)
+    position = jnp.linalg.norm(out.position - recording.position) / jnp.linalg.norm(
+        recording.position
+    )
     force = jnp.linalg.norm(out.force - recording.force) / jnp.linalg.norm(recording.force)
     assert float(position) < 0.0004
     assert float(force) < 0.08

@@ -172,9 +172,7 @@ class AbstractLaw(AbstractTerm):
         if not self.nonlinear:
             return self
         names = [parameter.name for parameter in self.nonlinear]
-        return eqx.tree_at(
-            lambda term: [getattr(term, name) for name in names], self, list(beta)
-        )
+        return eqx.tree_at(lambda term: [getattr(term, name) for name in names], self, list(beta))
 
 
 class Sum(AbstractTerm):
@@ -341,10 +339,12 @@ def _unique(parameters):
     unique = []
     for parameter in parameters:
         count = seen[parameter.name] = seen.get(parameter.name, 0) + 1
-        unique.append(parameter if count == 1 else parameter._replace(name=_numbered(parameter.name, count)))
+        unique.append(
+            parameter if count == 1 else parameter._replace(name=_numbered(parameter.name, count))
+        )
     return tuple(unique)
 
 
 def _numbered(name: str, count: int) -> str:
     stem = name.rstrip("+-")
-    return f"{stem}_{count}{name[len(stem):]}"
+    return f"{stem}_{count}{name[len(stem) :]}"

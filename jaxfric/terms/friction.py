@@ -61,7 +61,7 @@ class Gaussian(AbstractLaw):
 
 
 class Lorentzian(AbstractLaw):
-    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha 2004, eq. 29).
+    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha, eq. 29).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
     """
