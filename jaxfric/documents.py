@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from .identification import Identified, Result, result_names
+from .identified import Identified, Result, result_names
 from .recording import Recording
 
 IDENTIFICATION = "jaxfric.identification/1"
 
 
 def recording_facts(recording: Recording, notes: Sequence[str] = ()) -> dict[str, Any]:
-    """File, samples, duration (s), sample rate (Hz) of a recording, and what was put in order."""
+    """File, samples, duration (s), mean sample rate (Hz) of a recording, and what was tidied."""
     mask = np.asarray(recording.mask)
     time, segment = np.asarray(recording.time)[mask], np.asarray(recording.segment)[mask]
     steps = np.diff(time)[np.diff(segment) == 0]
@@ -24,7 +24,7 @@ def recording_facts(recording: Recording, notes: Sequence[str] = ()) -> dict[str
         "used": int(np.count_nonzero(mask)),
         "segments": int(np.unique(segment).size),
         "duration": float(np.sum(steps)),
-        "sample_rate": float(1 / np.median(steps)) if steps.size else None,
+        "sample_rate": float(steps.size / np.sum(steps)) if steps.size else None,
         "notes": list(notes),
     }
 
@@ -48,10 +48,17 @@ def identification(found: Identified, recording: Recording, notes: Sequence[str]
         "projection": found.projection,
         "windows": int(found.windows),
         "covered": float(found.covered),
+        "open_ends": open_ends(found),
         "result": result,
         "diagnosis": str(Result[found.result]),
         "force_error": float(found.force_error),
     }
+
+
+def open_ends(found: Identified) -> dict[str, float]:
+    """The bias that the whole record's unequal end velocities would leave, by parameter."""
+    names = [parameter.name for parameter in found.model.term.affine]
+    return dict(zip(names, map(float, found.open_ends), strict=True))
 
 
 def to_json(document: Any) -> str:

@@ -1,7 +1,9 @@
 """What the command prints for a person: plain aligned text."""
 
 import math
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from .models import NAMED
@@ -22,54 +24,115 @@ def models() -> str:
     lines = [f"{name:{width}}  {EQUATIONS[name]}" for name in NAMED]
     lines += [
         "",
-        "Fc coulomb, Fv viscous, Fb stribeck_force, vs stribeck_velocity, δ stribeck_exponent; each",
-        "direction of motion has its own (names end in + and -), and M dv/dt, inertia, is added.",
+        "Fc coulomb, Fv viscous, Fb stribeck_force, vs stribeck_velocity, δ stribeck_exponent;",
+        "each direction of motion has its own (names end in + and -); inertia, M dv/dt, is added.",
         "The prefix symmetric- ties the directions and adds a constant offset.",
     ]
     return "\n".join(lines)
 
 
-def identification(document: Mapping[str, Any], truth: Mapping[str, float] | None = None) -> str:
-    """An identification (schema `jaxfric.identification/1`) as a table with its circumstances."""
-    facts = document["recording"]
-    rate = f"{facts['sample_rate']:.6g} Hz" if facts["sample_rate"] else "one sample"
-    source = f"{facts['file'] or 'recording'}: {facts['samples']} samples, "
-    pieces = f", {facts['segments']} segments" if facts["segments"] > 1 else ""
-    lines = [source + f"{facts['duration']:.4g} s at {rate}{pieces}"]
-    lines += [f"  {note}" for note in facts["notes"]]
-    lines += ["", f"model {document['name']}, {_how(document)}", ""]
+def identification(
+    document: Mapping[str, Any],
+    truth: Mapping[str, float] | None = None,
+    automatic: bool = True,
+) -> str:
+    """An identification (schema `jaxfric.identification/1`) as a table with its circumstances.
+
+    **Arguments:** `truth`, true values to stand beside; `automatic`, whether the projection was
+    left to choose itself, so that the reason is told.
+    """
+    lines = _source(document)
+    lines += ["", f"model {document['name']}; {_how(document, automatic)}", ""]
     lines += _rows(document["parameters"], truth)
     lines += ["", f"force error {document['force_error']:.2%}   result {document['result']}"]
     if document["result"] != "successful":
-        lines.append(document["diagnosis"])
-    lines += _remarks(document["parameters"])
+        lines += _wrapped(document["diagnosis"])
+    lines += _remarks(document["parameters"]) + _closing(document)
     return "\n".join(lines)
 
 
-def _how(document: Mapping[str, Any]) -> str:
+def many(documents: Sequence[Mapping[str, Any]]) -> str:
+    """Identifications of several recordings, one row each."""
+    names = list(dict.fromkeys(name for d in documents for name in d["parameters"]))
+    units = {name: e["unit"] for d in documents for name, e in d["parameters"].items()}
+    same_model = len({d["name"] for d in documents}) == 1
+    head = ["file", "model", "force error", *names, "result"]
+    rows = [head, ["", "", "", *(units[name] for name in names), ""]]
+    for document in documents:
+        cells = [_cell(document["parameters"].get(name), document) for name in names]
+        error = f"{document['force_error']:.2%}"
+        file = Path(document["recording"]["file"]).name
+        rows.append([file, document["name"], error, *cells, document["result"]])
+    if same_model:
+        rows = [[row[0], *row[2:]] for row in rows]
+    numeric = range(1 if same_model else 2, len(rows[0]) - 1)
+    lines = [f"model {documents[0]['name']}", ""] if same_model else []
+    lines += _aligned(rows, numeric)
+    lines += ["", "~ the 95 % interval is wider than the value; - not visible; intervals: --json"]
+    for verdict in dict.fromkeys(d["result"] for d in documents if d["result"] != "successful"):
+        diagnosis = next(d["diagnosis"] for d in documents if d["result"] == verdict)
+        lines += _wrapped(f"{verdict}: {diagnosis}")
+    return "\n".join(lines)
+
+
+def _cell(entry: Mapping[str, Any] | None, document: Mapping[str, Any]) -> str:
+    if entry is None or not math.isfinite(entry["standard_error"]):
+        return "-"
+    doubtful = _half(entry, document["parameters"]) > abs(entry["value"])
+    return f"{'~' * doubtful}{entry['value']:.4g}"
+
+
+def _half(entry: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
+    """Half the 95 % interval."""
+    quantile = student_quantile(0.975, BLOCKS - (len(parameters) + 1) // 2)
+    return quantile * entry["standard_error"]
+
+
+def _source(document: Mapping[str, Any]) -> list[str]:
+    """The recording: how much of it, in which units, and what was put in order."""
+    facts, units = document["recording"], document["model"]["units"]
+    rate = f"{facts['duration']:.4g} s at {facts['sample_rate']:.6g} Hz, " * bool(
+        facts["sample_rate"]
+    )
+    pieces = f"{facts['segments']} segments, " * (facts["segments"] > 1)
+    left = facts["samples"] - facts["used"]
+    used = f"{facts['samples']} samples" + f" ({left} left out)" * (left > 0)
+    named = f"force in {units['force']}, position in {units['position']}"
+    source = f"{facts['file'] or 'recording'}: {used}, {rate}{pieces}{named}"
+    return [source, *(f"  {note}" for note in facts["notes"])]
+
+
+def _how(document: Mapping[str, Any], automatic: bool) -> str:
     covered = f"{document['covered']:.0%} of the slip time"
     if document["projection"] == "closed_windows":
         count = document["windows"]
-        return f"closed windows ({count} window{'s' * (count != 1)}, {covered}; no mass, no acceleration)"
-    return f"weak form ({document['windows']} slip stretches, {covered}; inertia fitted too)"
+        which = f"{count} window{'s' * (count != 1)}"
+        return f"closed windows ({which}, {covered}; no mass, no acceleration)"
+    why = "closed windows would use less than half of it; " * automatic
+    return f"weak form ({document['windows']} slip stretches, {covered}; {why}inertia fitted too)"
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, 98)
 
 
 def _rows(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> list[str]:
-    quantile = student_quantile(0.975, BLOCKS - (len(parameters) + 1) // 2)
-    head = ["parameter", "value", "± 95 %", "unit"] + (["true"] if truth else [])
-    table = [head]
+    table = [["parameter", "value", "± 95 %", "unit"] + (["true"] if truth else [])]
     for name, entry in parameters.items():
-        value, error = entry["value"], entry["standard_error"]
-        seen = math.isfinite(error)
+        seen = math.isfinite(entry["standard_error"])
         row = [
             name,
-            f"{value:.5g}" if seen else "-",
-            f"{quantile * error:.2g}" if seen else "not visible",
+            f"{entry['value']:.5g}" if seen else "-",
+            f"{_half(entry, parameters):.2g}" if seen else "not visible",
             entry["unit"],
         ]
         table.append(row + ([f"{truth[name]:.5g}"] if truth else []))
-    widths = [max(len(row[i]) for row in table) for i in range(len(head))]
-    numeric = (1, 2, 4)
+    return _aligned(table, (1, 2, 4))
+
+
+def _aligned(table: Sequence[Sequence[str]], numeric: Sequence[int]) -> list[str]:
+    """Columns of one width each, numbers to the right."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
         "  ".join(
             cell.rjust(width) if i in numeric else cell.ljust(width)
@@ -79,18 +142,50 @@ def _rows(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> l
     ]
 
 
+def _closing(document: Mapping[str, Any]) -> list[str]:
+    """What closing the windows was good for, where it was more than the uncertainty."""
+    parameters = document["parameters"]
+    gains = [
+        f"{name} by {bias:+.2g} {parameters[name]['unit']}"
+        for name, bias in document["open_ends"].items()
+        if abs(bias) > parameters[name]["standard_error"]
+    ]
+    if not gains:
+        return []
+    return _wrapped(
+        "Used whole, with its unequal end velocities, the record would be off in "
+        + ", ".join(gains)
+        + "."
+    )
+
+
 def _remarks(parameters: Mapping[str, Any]) -> list[str]:
     """What an engineer would object to, said first."""
-    remarks = []
-    for name, entry in parameters.items():
-        clear = abs(entry["value"]) > 2 * entry["standard_error"]
-        if name.startswith("stribeck_force") and entry["value"] < 0 and clear:
-            remarks.append(
-                f"{name} is negative: friction falls towards zero speed instead of rising. That is "
-                "no Stribeck effect; presliding, lag or a small dead-time near reversals looks so."
-            )
-        if name.startswith(("coulomb", "viscous", "inertia")) and entry["value"] < 0 and clear:
-            remarks.append(
-                f"{name} is negative, which no passive axis is: check the signs of force and motion."
-            )
-    return remarks
+    sizes = {name: (e["value"], _half(e, parameters)) for name, e in parameters.items()}
+    falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
+    # An infinite half width is "not visible", which the table and the diagnosis say already.
+    faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half < math.inf]
+    passive = ("coulomb", "viscous", "inertia")
+    wrong = [n for n, (value, half) in sizes.items() if n.startswith(passive) and value < -half]
+    lines = []
+    if falling:
+        lines += _wrapped(
+            f"{' and '.join(falling)} negative: friction falls towards zero speed instead of "
+            "rising. That is no Stribeck effect; presliding, lag or a dead time near reversals "
+            "looks so."
+        )
+    if faint:
+        lines += _wrapped(
+            f"{' and '.join(faint)} cannot be told from zero, so its velocity means nothing: a "
+            "simpler model may do (--model best lets held-out data choose)."
+        )
+    if wrong:
+        lines += _wrapped(
+            f"{' and '.join(wrong)} negative, which no passive axis is: check the signs of force "
+            "and motion, and whether a current or torque limit or a load was at work."
+        )
+    return lines
+
+
+def _bump(name: str) -> bool:
+    return name.startswith("stribeck_force")

@@ -1,0 +1,208 @@
+"""The command `jaxfric`: the only place that parses arguments, prints, and switches on float64.
+
+Nothing heavy is imported before a command runs, so that `jaxfric --help` answers at once.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from pathlib import Path
+
+from . import options
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command; returns the exit status: 0 done, 2 bad input or usage."""
+    arguments = _parser().parse_args(argv)
+    name = f"jaxfric {arguments.command}"
+    try:
+        _configure()
+        status = arguments.run(arguments)
+        sys.stdout.flush()
+        return status
+    except BrokenPipeError:  # the reader, `head` for one, has seen enough
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115 - Python flushes it at exit
+        return 0
+    except (ValueError, OSError) as error:
+        print(f"{name}: {options.message(error)}", file=sys.stderr)
+        return 2
+    except MemoryError:
+        print(f"{name}: out of memory; split the file or identify fewer samples.", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"{name}: interrupted", file=sys.stderr)
+        return 130
+
+
+def _configure() -> None:
+    """float64, and compiled programs kept in the user's cache folder."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    folder = _cache_folder()
+    if folder is None:
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return  # slower from the second run on, and no worse
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+
+
+def _cache_folder() -> Path | None:
+    """Where JAXFRIC_CACHE says, else the platform's folder for caches; `None` for "off"."""
+    chosen = os.environ.get("JAXFRIC_CACHE", "")
+    if chosen:
+        return None if chosen == "off" else Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME")
+    if not base and sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA")
+    if not base and sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    return Path(base or Path.home() / ".cache") / "jaxfric"
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line, as every other message of the command."""
+
+    def error(self, message: str):
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+class _Version(argparse.Action):
+    """Prints the version, which takes time to look up and so is looked up only when asked for."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            print(f"jaxfric {version('jaxfric')}")
+        except PackageNotFoundError:
+            print("jaxfric, not installed: run from its source")
+        parser.exit()
+
+
+def _lazily(place: str) -> Callable[[argparse.Namespace], int]:
+    """A function of this package, `module.name`, imported when it is called."""
+    module, _, name = place.partition(".")
+    return lambda arguments: getattr(import_module(f".{module}", __name__), name)(arguments)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="jaxfric",
+        description="Friction of drive axes, identified without mass and without acceleration.",
+        epilog="JAXFRIC_CACHE: folder for compiled programs, or off.",
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (_add_demo, _add_identify, _add_predict, _add_simulate, _add_models):
+        add(commands)
+    return parser
+
+
+def _add(commands, name: str, run: str, text: str) -> argparse.ArgumentParser:
+    command = commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+    command.set_defaults(run=_lazily(run))
+    return command
+
+
+def _add_demo(commands) -> None:
+    command = _add(commands, "demo", "demo.run", "identify the friction of a simulated machine")
+    command.add_argument(
+        "--out", default="jaxfric-demo", metavar="FOLDER", help="what it writes goes here"
+    )
+
+
+def _add_identify(commands) -> None:
+    command = _add(commands, "identify", "commands.identify", "friction of one or many recordings")
+    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    command.add_argument(
+        "--model",
+        default="gaussian",
+        metavar="NAME",
+        help="a name that jaxfric models lists, or best: held-out data choose (default: gaussian)",
+    )
+    command.add_argument(
+        "--projection",
+        choices=("auto", "closed-windows", "weak-form"),
+        default="auto",
+        help="without mass and acceleration, or with inertia fitted too (default: auto)",
+    )
+    command.add_argument(
+        "--bounds",
+        type=options.bounds,
+        default={},
+        metavar="NAME=LOW:HIGH,…",
+        help="of nonlinear parameters, for instance stribeck_velocity+=0.001:0.1",
+    )
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the identification; - prints it"
+    )
+    command.add_argument(
+        "--save", type=options.output, metavar="MODEL.json", help="write the identified model"
+    )
+    command.add_argument(
+        "--plot", type=options.picture, metavar="OUT.png", help="draw it (extra: report)"
+    )
+    _add_reading(command)
+
+
+def _add_predict(commands) -> None:
+    command = _add(
+        commands, "predict", "commands.predict", "the force that a recorded motion needs"
+    )
+    command.add_argument("model", metavar="MODEL.json")
+    command.add_argument("file", metavar="FILE", help="the recording")
+    command.add_argument("-o", "--out", type=options.output, required=True, metavar="OUT.csv")
+    _add_reading(command)
+
+
+def _add_simulate(commands) -> None:
+    command = _add(
+        commands, "simulate", "commands.simulate", "run a model forward, with stick and slip"
+    )
+    command.add_argument("model", metavar="MODEL.json")
+    command.add_argument("file", metavar="REFERENCE.csv", help="set-point, or force, over time")
+    command.add_argument("-o", "--out", type=options.output, required=True, metavar="OUT.csv")
+    command.add_argument(
+        "--controller",
+        type=options.controller,
+        metavar="KIND:GAIN=VALUE,…",
+        help="pd:kp=,kd= | pid:kp=,ki=,kd= | cascade:kp=,kv= (each also limit=); "
+        "without one the force column drives",
+    )
+    _add_reading(command)
+
+
+def _add_models(commands) -> None:
+    _add(commands, "models", "commands.models", "the friction models, with their equations")
+
+
+def _add_reading(command: argparse.ArgumentParser) -> None:
+    group = command.add_argument_group("how to read the file")
+    group.add_argument(
+        "--columns",
+        type=options.names,
+        default={},
+        metavar="ROLE=NAME,…",
+        help="for instance force=vir,position=qm",
+    )
+    group.add_argument(
+        "--scale",
+        type=options.factors,
+        default={},
+        metavar="ROLE=FACTOR,…",
+        help="for instance position=0.001",
+    )
+    group.add_argument(
+        "--units",
+        type=options.names,
+        default={},
+        metavar="force=N,position=m",
+        help="after scaling; they name, they do not convert",
+    )

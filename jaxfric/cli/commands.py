@@ -1,0 +1,224 @@
+"""The commands but the demo: identify, predict, simulate, models."""
+
+import dataclasses
+import sys
+from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import control, documents, models as known, tabulate
+from ..identification import identify as identify_recording
+from ..identified import Identified
+from ..io import read_with_notes, write_bytes, write_table, write_text
+from ..models import Model
+from ..prediction import predict as predict_force
+from ..projections import ClosedWindows, WeakForm
+from ..recording import Recording, pad
+from ..report import pictures
+from ..selection import select
+from ..signals import kernel_half_width, prepare
+from ..simulation import simulate as simulate_model
+from ..units import SI
+from .options import message
+
+# A file is padded to the next of these multiples of a power of two, so that one compiled program
+# serves many files; at most a fifth of the samples is padding.
+PADDING = (1.0, 1.25, 1.5, 1.75, 2.0)
+SHORTEST = 256
+
+
+def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[str]]:
+    """The recording in a file, as the reading options say, and what was put in order."""
+    return read_with_notes(
+        path,
+        columns=arguments.columns,
+        scale=arguments.scale,
+        units=arguments.units,
+        **more,
+    )
+
+
+def uniform(recording: Recording) -> Recording:
+    """A recording without what makes one compiled program serve it alone: length, name, pieces."""
+    power = max(SHORTEST, 1 << (recording.num_samples.bit_length() - 1))
+    length = next(int(f * power) for f in PADDING if f * power >= recording.num_samples)
+    pieces = 1 << (recording.num_segments - 1).bit_length()
+    return dataclasses.replace(pad(recording, length), source="", num_segments=pieces)
+
+
+def fitted(
+    recording: Recording,
+    model: str,
+    projection: str = "auto",
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[str, Identified]:
+    """The name of the identified model (chosen, where it was `best`) and what was identified."""
+    if model == "best":
+        model = select(recording).name
+    prepared = prepare(uniform(recording))
+    chosen = None
+    if projection == "closed-windows":
+        chosen = ClosedWindows()
+    elif projection == "weak-form":
+        chosen = WeakForm(kernel_half_width(prepared))
+    try:
+        found = identify_recording(model, prepared, projection=chosen, bounds=bounds)
+    except ValueError as error:
+        raise ValueError(f"{recording.source}: {error}") from error
+    return model, found
+
+
+def identify(arguments: Namespace) -> int:
+    """`jaxfric identify`: one recording in full, or many in a table."""
+    many = len(arguments.files) > 1
+    if arguments.model != "best":
+        _check(arguments.model, arguments.bounds)
+    if many and (arguments.plot or arguments.save):
+        raise ValueError("--plot and --save take one recording; for many, use --json.")
+    if arguments.plot:
+        pictures.library()
+    done, failures = [], 0
+    for i, path in enumerate(arguments.files):
+        _progress(f"{i + 1}/{len(arguments.files)} {path}")
+        try:
+            done.append(_identify(path, arguments))
+        except (ValueError, OSError) as error:
+            _progress("")
+            print(f"jaxfric identify: {message(error)}", file=sys.stderr)
+            failures += 1
+    _progress("")
+    if arguments.json != "-" and done:
+        alone = arguments.projection == "auto"
+        text = tabulate.many(done) if many else tabulate.identification(done[0], automatic=alone)
+        print(text)
+    if arguments.json and (done or many):
+        put(arguments.json, documents.to_json(done if many else done[0]))
+    return 2 if failures else 0
+
+
+def _check(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
+    searched = [p.name for p in known.named(model).nonlinear]
+    if unknown := sorted(set(bounds) - set(searched)):
+        raise ValueError(
+            f"--bounds names {', '.join(unknown)}, which {model} does not search; it searches "
+            f"{', '.join(searched) or 'nothing'}."
+        )
+
+
+def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
+    """The document of one file; its model and picture are written."""
+    recording, notes = read(path, arguments)
+    name, found = fitted(recording, arguments.model, arguments.projection, arguments.bounds)
+    document = documents.identification(found, recording, notes) | {"name": name}
+    if arguments.save or arguments.plot:
+        if not np.all(np.isfinite([float(v) for v in found.model.parameters.values()])):
+            raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
+    if arguments.save:
+        put(arguments.save, documents.to_json(found.model.to_dict()))
+    if arguments.plot:
+        draw(found, recording, arguments.plot)
+    return document
+
+
+def draw(found: Identified, recording: Recording, path: str | Path) -> None:
+    """Write the picture of an identification."""
+    drawn = dataclasses.replace(uniform(recording), source=recording.source)
+    write_bytes(path, pictures.render(found, drawn, Path(path).suffix.lstrip(".").lower()))
+
+
+def put(path: str, text: str) -> None:
+    """Write text to a file, or to standard output for `-`."""
+    if path == "-":
+        sys.stdout.write(text)
+    else:
+        write_text(path, text)
+
+
+def _progress(text: str) -> None:
+    """One line on standard error that the next one replaces; only on a terminal."""
+    if sys.stderr.isatty():
+        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+
+
+def predict(arguments: Namespace) -> int:
+    """`jaxfric predict`: force beside the measured one, as a table."""
+    model = _load(arguments.model)
+    recording, notes = read(arguments.file, arguments)
+    recording = _in_units(recording, model, arguments)
+    force = np.asarray(predict_force(model, uniform(recording)))[: recording.num_samples]
+    measured, mask = np.asarray(recording.force), np.asarray(recording.mask)
+    columns = {"time": recording.time, "force": force, "measured_force": measured}
+    write_table(arguments.out, columns)
+    for note in notes:
+        print(f"  {note}")
+    size = np.linalg.norm(measured[mask])
+    error = np.linalg.norm((measured - force)[mask])
+    share = f"{error / size:.2%}" if size > 0 else "undefined: the measured force is zero"
+    print(f"{arguments.out}: {force.size} samples; norm(measured - predicted)/norm = {share}")
+    return 0
+
+
+def simulate(arguments: Namespace) -> int:
+    """`jaxfric simulate`: motion and force of a model, as a table."""
+    model = _load(arguments.model)
+    controller = None
+    if arguments.controller:
+        kinds = {"pd": control.PD, "pid": control.PID, "cascade": control.Cascade}
+        kind, gains = arguments.controller
+        controller = kinds[kind](**gains)
+    reference, notes = read(arguments.file, arguments, set_point=True)
+    reference = _in_units(reference, model, arguments)
+    if controller is None and not np.any(np.asarray(reference.force)):
+        raise ValueError(
+            f"{arguments.file}: no force drives the axis. Name the column (--columns force=NAME) "
+            "or follow a set-point (--controller pd:kp=…,kd=…)."
+        )
+    run = simulate_model(model, reference, controller)
+    if not np.all(np.isfinite(np.asarray(run.position))):
+        raise ValueError(
+            f"{arguments.file}: the simulated motion grows without bound. Check the gains and "
+            "the sample rate (a gain must act slower than the clock) and the model's units."
+        )
+    columns = {"time": run.time, "force": run.force, "position": run.position}
+    if run.velocity is not None:
+        columns["velocity"] = run.velocity
+    write_table(arguments.out, columns | run.channels)
+    for note in notes:
+        print(f"  {note}")
+    print(f"{arguments.out}: {run.num_samples} samples")
+    return 0
+
+
+def _load(path: str) -> Model:
+    try:
+        return known.load(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, UnicodeDecodeError) as error:
+        raise ValueError(
+            f"{path}: {error} A model is written by jaxfric identify --save."
+        ) from None
+
+
+def _in_units(recording: Recording, model: Model, arguments: Namespace) -> Recording:
+    """The recording under the model's unit names; refused where it states another unit.
+
+    A file that states no unit is read in N and m; what is no statement gives way.
+    """
+    own, wanted = recording.unit_names, dict(model.units)
+    for quantity, unit in own.items():
+        stated = quantity in arguments.units or unit != SI[quantity]
+        if unit != wanted[quantity] and stated:
+            raise ValueError(
+                f"{recording.source}: {quantity} is in {unit}, in the model in "
+                f"{wanted[quantity]}. Convert: --scale {quantity}=FACTOR "
+                f"--units {quantity}={wanted[quantity]}."
+            )
+    return dataclasses.replace(recording, units=tuple(wanted.items()))
+
+
+def models(arguments: Namespace) -> int:
+    """`jaxfric models`: names and equations."""
+    print(tabulate.models())
+    return 0

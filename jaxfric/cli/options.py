@@ -1,0 +1,85 @@
+"""Values of the command's options, and the message of an error. Imports nothing heavy."""
+
+import math
+from argparse import ArgumentTypeError
+from pathlib import Path
+
+# Gains of each controller that `simulate` knows; `limit` bounds the force of any of them.
+CONTROLLERS = {"pd": ("kp", "kd"), "pid": ("kp", "ki", "kd"), "cascade": ("kp", "kv")}
+PICTURES = ("png", "pdf", "svg")
+
+
+def message(error: BaseException) -> str:
+    """What an error says, with the file's name where the system reports one."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror or error}"
+    return str(error) or type(error).__name__
+
+
+def names(text: str) -> dict[str, str]:
+    """`a=b,c=d` as a mapping."""
+    pairs = {}
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        key, equals, value = item.partition("=")
+        if not equals or not key.strip():
+            raise ArgumentTypeError(f"{item!r} is not of the form NAME=VALUE")
+        pairs[key.strip()] = value.strip()
+    return pairs
+
+
+def number(text: str) -> float:
+    """A finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
+def factors(text: str) -> dict[str, float]:
+    """`a=1.5,b=2` as a mapping to numbers."""
+    return {name: number(value) for name, value in names(text).items()}
+
+
+def bounds(text: str) -> dict[str, tuple[float, float]]:
+    """`a=low:high,…` as a mapping to pairs of numbers."""
+    found = {}
+    for name, span in names(text).items():
+        low, colon, high = span.partition(":")
+        limits = (number(low), number(high)) if colon else (1.0, 0.0)
+        if not limits[0] < limits[1]:
+            raise ArgumentTypeError(f"{name}={span} is not of the form NAME=LOW:HIGH")
+        found[name] = limits
+    return found
+
+
+def controller(text: str) -> tuple[str, dict[str, float]]:
+    """`kind:gain=value,…` as the kind and its gains, all of them given."""
+    kind, _, rest = text.partition(":")
+    if kind not in CONTROLLERS:
+        raise ArgumentTypeError(f"there is no {kind!r}; there are {', '.join(CONTROLLERS)}")
+    gains = factors(rest)
+    wanted = CONTROLLERS[kind]
+    if missing := [gain for gain in wanted if gain not in gains]:
+        example = ",".join(f"{gain}=…" for gain in wanted)
+        raise ArgumentTypeError(f"{kind} lacks {', '.join(missing)}: {kind}:{example}")
+    if unknown := sorted(set(gains) - {*wanted, "limit"}):
+        raise ArgumentTypeError(f"{kind} has no {', '.join(unknown)}; it has {', '.join(wanted)}")
+    return kind, gains
+
+
+def output(text: str) -> str:
+    """A path to write to, its folder there: said before the work instead of after it."""
+    if text != "-" and not Path(text).absolute().parent.is_dir():
+        raise ArgumentTypeError(f"{text}: there is no folder {Path(text).parent}; make it first")
+    return text
+
+
+def picture(text: str) -> str:
+    """A path to draw to, of a kind that can be drawn."""
+    if Path(text).suffix.lstrip(".").lower() not in PICTURES:
+        kinds = ", ".join(f".{kind}" for kind in PICTURES)
+        raise ArgumentTypeError(f"{text}: pictures are written as {kinds}; use that suffix")
+    return output(text)
