@@ -1,0 +1,120 @@
+"""Do the nominal 95 % intervals hold the truth 95 times of 100?"""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxfric as jf
+from jaxfric import uncertainty
+from jaxfric.identified import result_names
+
+
+def trajectory(rng, seconds, rate):
+    """A multisine of random lines and phases that ends at the velocity at which it began."""
+    t = np.arange(int(seconds * rate) + 1) / rate
+    lines = np.sort(rng.choice(np.arange(2, 16), 4, replace=False))
+    size, phase = rng.uniform(0.3, 1.0, 4) / lines, rng.uniform(0, 2 * np.pi, 4)
+    w = 2 * np.pi * lines / seconds
+    angle = w[:, None] * t + phase[:, None]
+    x = size @ np.sin(angle)
+    return t, x, (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
+
+
+def coloured(rng, count, correlation, rate):
+    """Noise of unit variance and exponential autocorrelation, `correlation` in seconds."""
+    white = rng.normal(size=count)
+    if correlation == 0:
+        return white
+    pole = math.exp(-1 / (correlation * rate))
+    noise = np.empty(count)
+    noise[0] = white[0]
+    for i in range(1, count):
+        noise[i] = pole * noise[i - 1] + math.sqrt(1 - pole**2) * white[i]
+    return noise
+
+
+def machine(rng, name, seconds=8.0, rate=1000.0):
+    """A drawn machine and its recording: units from µN·m to kN, white or coloured disturbance."""
+    t, x, v, a = trajectory(rng, seconds, rate)
+    force, length = 10.0 ** rng.uniform(-4, 4), 10.0 ** rng.uniform(-4, 2)
+    x, v, a = (length * s for s in (x, v, a))
+    top = np.max(np.abs(v))
+    true = {"inertia": force * rng.uniform(0.3, 3) / np.max(np.abs(a))}
+    for sign in "+-":
+        true["coulomb" + sign] = force * rng.uniform(0.5, 1.5)
+        true["viscous" + sign] = force * rng.uniform(0.3, 1.5) / top
+        true["stribeck_force" + sign] = force * rng.uniform(0.3, 0.8)
+        true["stribeck_velocity" + sign] = top * rng.uniform(0.04, 0.1)
+    term = jf.models.named(name)
+    wanted = [p.name for p in (*term.affine, *term.nonlinear)]
+    model = jf.models.from_parameters(term, {key: true[key] for key in wanted})
+    bare = jf.Recording(time=t, force=0 * t, position=x, velocity=v)
+    noise = 0.03 * force * coloured(rng, t.size, rng.choice([0.0, 0.005, 0.02]), rate)
+    total = np.asarray(model.force(bare)) + true["inertia"] * a + noise
+    return model, jf.Recording(time=t, force=total, position=x, velocity=v)
+
+
+def coverage(name, projection, count, seed):
+    """Share of the intervals that hold the truth, over all parameters of successful rows."""
+    rng = np.random.default_rng(seed)
+    drawn = [machine(rng, name) for _ in range(count)]
+    found = jf.identify(name, jf.stack([r for _, r in drawn]), projection=projection)
+    fine = np.asarray(found.result._value) == result_names().index("successful")
+    held = []
+    for key, estimate in found.parameters.items():
+        low, high = (np.asarray(limit) for limit in estimate.interval(0.95))
+        truth = np.array([float(model.parameters[key]) for model, _ in drawn])
+        held.append(((low <= truth) & (truth <= high))[fine])
+    return np.array(held), fine
+
+
+PROJECTIONS = [jf.ClosedWindows(), jf.WeakForm(16)]
+
+
+@pytest.mark.parametrize("projection", PROJECTIONS, ids=["closed", "weak"])
+def test_coverage_of_the_affine_model(projection):
+    held, fine = coverage("coulomb-viscous", projection, 48, seed=11)
+    assert fine.all()
+    # 48 machines x 5 parameters; those of one machine are correlated, so count 48 x 2: four
+    # binomial deviations of 0.95 are 0.09.
+    assert 0.86 <= held.mean() <= 1.0, held.mean(axis=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["coulomb-viscous", "gaussian"])
+@pytest.mark.parametrize("projection", PROJECTIONS, ids=["closed", "weak"])
+def test_coverage_over_many_machines(name, projection):
+    held, fine = coverage(name, projection, 240, seed=12)
+    print(f"\n{name} {projection}: {held.mean():.3f}", held.mean(axis=1).round(3), fine.mean())
+    assert fine.mean() > 0.95
+    assert 0.90 <= held.mean() <= 0.98, held.mean(axis=1)
+    assert held.mean(axis=1).min() >= 0.85, held.mean(axis=1)
+
+
+def test_what_is_not_seen_is_infinitely_uncertain():
+    columns = jnp.stack([jnp.ones(200), jnp.linspace(0, 1, 200), jnp.linspace(0, 2, 200)], 1)
+    noise = jnp.asarray(np.random.default_rng(0).normal(size=200))
+    weight, block = jnp.ones(200), jnp.arange(200) // 7
+    matrix = uncertainty.covariance(columns, noise, weight, block)
+    assert bool(jnp.isfinite(matrix[0, 0]))
+    assert bool(jnp.isinf(matrix[1, 1])) and bool(jnp.isinf(matrix[2, 2]))
+
+
+def test_the_sandwich_of_white_noise_is_the_classical_covariance():
+    rng = np.random.default_rng(1)
+    columns = jnp.asarray(rng.normal(size=(6400, 2)) * [1.0, 50.0])
+    block, weight = jnp.asarray(np.arange(6400) // 100), jnp.ones(6400)
+    draws = [
+        np.diagonal(uncertainty.covariance(columns, jnp.asarray(e), weight, block))
+        for e in rng.normal(size=(20, 6400))
+    ]
+    classical = np.diagonal(np.linalg.inv(np.asarray(columns.T @ columns)))
+    # 64 blocks, 20 draws: the mean variance is known to sqrt(2 / (64 * 20)) = 4 %.
+    np.testing.assert_allclose(np.mean(draws, axis=0), classical, rtol=0.16)
+
+
+@pytest.mark.parametrize(("degrees", "expected"), [(5, 2.5706), (10, 2.2281), (28, 2.0484)])
+def test_student_quantile(degrees, expected):
+    np.testing.assert_allclose(uncertainty.student_quantile(0.975, degrees), expected, rtol=3e-3)
