@@ -42,6 +42,11 @@ class Rows(eqx.Module):
     covered: Float[Array, ""]
     _filter: "Filter | None" = None
 
+    @property
+    def sampled(self) -> bool:
+        """Whether the rows are the samples themselves, not passed through a kernel."""
+        return self._filter is None
+
     def project(
         self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None = None
     ) -> Float[Array, "J p"]:

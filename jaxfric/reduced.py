@@ -8,6 +8,7 @@ L(β) = |r|² − hᵀ D⁻¹ h is a difference that has lost nothing to the lar
 import math
 from collections.abc import Callable
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -95,52 +96,113 @@ def cost(
     return jnp.sum(residual(basis, target, bumps) ** 2)
 
 
-def _single_bump_costs(bases, targets, roots, bump):
-    """L for one bump in every row at once: the bump is evaluated once, rows differ in weights.
+class Moments(eqx.Module):
+    """All that the reduced cost of one bump needs of the rows, for several weightings of them.
 
-    Removing the weighted mean first keeps the difference e·e − |Qᵀe|² from cancelling where the
-    bump is nearly constant.
+    A bump e is any function given by its values at the `J` places; the rows of the batch (the
+    directions of motion, eq. 24) differ in weights alone.
+
+    - `shared`: functions in the span of the columns without β, orthonormal under the weights
+      of all rows together, `(J, q)`, and `dual`, those times these weights.
+    - `against`: for each weighting, what e is multiplied with: its own orthonormal columns and
+      the force less its part in them, weighted, `(R, q + 1, J)`.
+    - `weights`: those of e², `(R, J)`. `whole`: the cost without a bump, N²·s, `(R,)`.
     """
-    weighted = roots * bump[None, :]
-    own = jnp.sum(roots * weighted, axis=1) / jnp.sum(roots**2, axis=1)
-    centred = roots * (bump[None, :] - own[:, None])
-    inside = jnp.einsum("rjq,rj->rq", bases, centred)
-    along = jnp.sum(targets * centred, axis=1)
-    size = jnp.sum(centred**2, axis=1)
-    rest = size - jnp.sum(inside**2, axis=1)
-    visible = rest > 1e3 * jnp.finfo(rest.dtype).eps * size
-    gain = jnp.where(visible, along**2 / jnp.where(visible, rest, 1.0), 0.0)
-    return jnp.sum(targets**2, axis=1) - gain
+
+    shared: Float[Array, "J q"]
+    dual: Float[Array, "J q"]
+    against: Float[Array, "R t J"]
+    weights: Float[Array, "R J"]
+    whole: Float[Array, " R"]
+
+    def costs(self, bumps: Float[Array, "B J"]) -> Float[Array, "R B"]:
+        """L of each bump and weighting, eq. (17), N²·s.
+
+        What all weightings can explain is first taken off the bump itself, so that the difference
+        e·e − |Qᵀe|² does not cancel where the bump is nearly constant or straight.
+        """
+        left = bumps - (bumps @ self.dual) @ self.shared.T
+        height, length, count = *self.against.shape[:2], bumps.shape[0]
+        products = self.against.reshape(height * length, -1) @ left.T
+        products = products.reshape(height, length, count)
+        size = self.weights @ (left * left).T
+        rest = size - jnp.sum(products[:, :-1] ** 2, axis=1)
+        # A bump inside the span leaves rounding of itself; its share of the cost is noise.
+        most = jnp.sum(self.weights, axis=1)[:, None] * jnp.max(bumps**2, axis=1)[None, :]
+        eps = 1e3 * jnp.finfo(rest.dtype).eps
+        visible = (rest > eps * size) & (rest > eps**2 * most)
+        gain = jnp.where(visible, products[:, -1] ** 2 / jnp.where(visible, rest, 1.0), 0.0)
+        return self.whole[:, None] - gain
+
+
+def moments(
+    columns: Float[Array, "J p"],
+    target: Float[Array, " J"],
+    roots: Float[Array, "R J"],
+    parity: Float[Array, " J"] | None = None,
+) -> Moments:
+    """The [`Moments`][] of rows.
+
+    **Arguments:** `columns`, those without β; `target`, the force, N; `roots`, square roots of the
+    weights; `parity`, a sign for each row that bumps will be given without.
+    """
+    bases = jax.vmap(lambda r: orthonormal(r[:, None] * columns))(roots)
+    left = jax.vmap(lambda b, r: project_out(b, (r * target)[:, None])[:, 0])(bases, roots)
+    together = root(jnp.sum(roots**2, axis=0))
+    shared = orthonormal(together[:, None] * columns)
+    against = jnp.concatenate([jnp.swapaxes(bases, 1, 2), left[:, None, :]], axis=1)
+    against = against * roots[:, None, :]
+    used = jnp.where(together > 0, together, 1.0)
+    function, dual = shared / used[:, None], shared * together[:, None]
+    if parity is not None:
+        against = against * parity[None, None, :]
+        function, dual = function * parity[:, None], dual * parity[:, None]
+    return Moments(function, dual, against, roots**2, jnp.sum(left**2, axis=1))
 
 
 def grid_costs(
-    bumps: Callable[[Float[Array, " d"]], Float[Array, "J k"]],
+    bump: Callable[[Float[Array, " d"]], Float[Array, " J"]],
     grid: Float[Array, "G d"],
-    bases: Float[Array, "R J q"],
-    targets: Float[Array, "R J"],
-    roots: Float[Array, "R J"],
-    constant_spanned: bool,
+    rows: Moments,
 ) -> Float[Array, "R G"]:
-    """The reduced cost over a grid of β, for several weightings of the same rows.
+    """The reduced cost of one bump, eq. (17), over a grid of β, N²·s, for each weighting.
 
-    **Arguments:** `bumps`, from β to the nonlinear columns, `(J, k)`; `grid`, `(G, d)`; for each
-    row of the batch (a direction of motion, eq. 24) `bases`, orthonormal weighted linear columns
-    `(R, J, q)`, `targets`, the projected weighted force `(R, J)`, `roots`, square roots of the
-    weights `(R, J)`; `constant_spanned`, whether one bump differs from a function that may be
-    shifted by a constant in the span.
-
-    Evaluated in tiles, so that memory is bounded whatever the grid.
+    `bump` maps β to the bump's values at the places of `rows`. Evaluated in tiles, so that memory
+    is bounded whatever the grid.
     """
 
-    def at(beta):
-        columns = bumps(beta)
-        if constant_spanned:
-            return _single_bump_costs(bases, targets, roots, columns[:, 0])
-        weigh = jax.vmap(lambda q, u, w: cost(q, u, w[:, None] * columns))
-        return weigh(bases, targets, roots)
+    def tile(betas):
+        return rows.costs(jax.vmap(bump)(betas))
 
-    batch = int(np.clip(TILE // max(1, roots.shape[1]), 1, 64))
-    return jax.lax.map(at, grid, batch_size=batch).T
+    return _tiled(tile, grid, rows.weights.shape[1])
+
+
+def general_grid_costs(
+    bumps: Callable[[Float[Array, " d"]], Float[Array, "J k"]],
+    grid: Float[Array, "G d"],
+    basis: Float[Array, "J q"],
+    target: Float[Array, " J"],
+) -> Float[Array, " G"]:
+    """The reduced cost of any number of weighted nonlinear columns over a grid of β, N²·s.
+
+    `basis`, orthonormal weighted columns without β; `target`, the projected weighted force.
+    """
+
+    def tile(betas):
+        return jax.vmap(lambda beta: cost(basis, target, bumps(beta)))(betas)[None, :]
+
+    return _tiled(tile, grid, 4 * target.shape[0])[0]
+
+
+def _tiled(tile, grid, width):
+    """`tile` over pieces of the grid, side by side; the last one is filled up, so that one
+    program serves all."""
+    count, dimensions = grid.shape
+    batch = int(np.clip(TILE // max(1, width), 1, min(64, count)))
+    pieces = -(-count // batch)
+    padded = jnp.pad(grid, ((0, pieces * batch - count), (0, 0)), mode="edge")
+    costs = jax.lax.map(tile, padded.reshape(pieces, batch, dimensions))
+    return jnp.moveaxis(costs, 1, 0).reshape(costs.shape[1], -1)[:, :count]
 
 
 def grid_points(dimensions: int, points: int | None, dtype) -> Float[Array, "G d"]:
@@ -167,13 +229,13 @@ def refine(
     start: Float[Array, " d"],
     cell: Float[Array, " d"],
 ) -> tuple[Float[Array, " d"], Bool[Array, ""]]:
-    """The minimiser near a grid point, inside the neighbouring points and the unit cube.
+    """The minimiser near a grid point, inside the unit cube; no step is longer than a grid cell.
 
     **Returns:** the refined point, never worse than `start`, and whether it converged.
     """
     tolerance = math.sqrt(float(jnp.finfo(start.dtype).eps)) * 1e-4
     solver = BoxGaussNewton(rtol=0.0, atol=tolerance)
-    box = {"lower": jnp.maximum(start - cell, 0.0), "upper": jnp.minimum(start + cell, 1.0)}
+    box = {"lower": jnp.zeros_like(start), "upper": jnp.ones_like(start), "reach": cell}
     found: optx.Solution = optx.least_squares(
         lambda y, _: residuals(y),
         solver,

@@ -36,7 +36,7 @@ class BoxGaussNewton(optx.AbstractLeastSquaresSolver):
     (Levenberg & Marquardt); unknowns that the box holds are left out of it. The result is
     never outside the box and never worse than the start, beyond rounding of the cost.
 
-    `options`: `lower` and `upper`, arrays of the unknowns' shape `(d,)`.
+    `options`: `lower`, `upper` and `reach`, the longest step, arrays of the unknowns' shape `(d,)`.
     """
 
     rtol: float
@@ -68,7 +68,9 @@ class BoxGaussNewton(optx.AbstractLeastSquaresSolver):
         damping = jnp.where(falls, state.damping / 8, jnp.maximum(8 * state.damping, 1e-2))
         damping = jnp.where(damping < 1e-4, 0.0, damping)
         lower, upper = options["lower"], options["upper"]
-        trial = jnp.clip(best.place + _newton(best, secant, damping, lower, upper), lower, upper)
+        move = _newton(best, secant, damping, lower, upper)
+        move = jnp.clip(move, -options["reach"], options["reach"])
+        trial = jnp.clip(best.place + move, lower, upper)
         # NaN takes no part: the point stays, and the solve ends.
         trial = jnp.where(jnp.isfinite(trial), trial, best.place)
         small = self.norm(trial - best.place) <= self.atol + self.rtol * self.norm(y)

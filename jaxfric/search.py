@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import reduced
+from . import compress, reduced
 from .projections import Rows
 from .recording import Recording
 from .terms.base import AbstractTerm, Directional, Sum, summands
+from .terms.friction import AbstractBump, Coulomb, Viscous
 
 
 class Found(NamedTuple):
@@ -126,15 +127,11 @@ def _grid_whole(problem: _Problem, points):
     basis, root, target = problem.linear()
     bumps = reduced.part(problem.term, True)
     grid = reduced.grid_points(len(problem.logarithmic), points, root.dtype)
-    costs = reduced.grid_costs(
-        lambda unit: problem.columns(bumps, unit),
-        grid,
-        basis[None],
-        target[None],
-        root[None],
-        False,
-    )
-    return _best(grid, costs[0])
+
+    def columns(unit):
+        return root[:, None] * problem.columns(bumps, unit)
+
+    return _best(grid, reduced.general_grid_costs(columns, grid, basis, target))
 
 
 def _grid_sides(sides, problem: _Problem, points):
@@ -147,18 +144,64 @@ def _grid_sides(sides, problem: _Problem, points):
     rows, recording = problem.rows, problem.recording
     roots = reduced.root(jnp.stack([rows.positive, rows.negative]))
     linear = [term for term in (reduced.part(inner, False), *shared) if term is not None]
-    stacked = jnp.concatenate([rows.columns(term, recording) for term in linear], axis=1)
-    bases = jax.vmap(lambda root: reduced.orthonormal(root[:, None] * stacked))(roots)
-    targets = jax.vmap(
-        lambda basis, root: reduced.project_out(basis, (root * rows.target)[:, None])[:, 0]
-    )(bases, roots)
+    columns = jnp.concatenate([rows.columns(term, recording) for term in linear], axis=1)
+    target = rows.target - rows.offset(problem.term, recording)
     bumps, count = reduced.part(inner, True), len(inner.nonlinear)
     grid = reduced.grid_points(count, points, roots.dtype)
-    costs = reduced.grid_costs(
-        lambda unit: problem.columns(bumps, unit, count), grid, bases, targets, roots, False
-    )
+    one = summands(bumps)
+    if len(bumps.affine) > 1:
+        costs = _general_sides(problem, bumps, grid, columns, target, roots)
+    elif rows.sampled and isinstance(one[0], AbstractBump) and _has_constant(linear):
+        costs = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
+    else:
+        moments = reduced.moments(columns, target, roots)
+        costs = reduced.grid_costs(
+            lambda unit: problem.columns(bumps, unit, count)[:, 0], grid, moments
+        )
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     return starts.reshape(-1), cells.reshape(-1)
+
+
+def _has_constant(linear) -> bool:
+    """Whether the columns without β contain Coulomb friction, a constant in each direction."""
+    return any(isinstance(t, Coulomb) for term in linear for t in summands(term))
+
+
+def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linear):
+    """The grid of one smooth bump over samples, by its contrast, and on nodes where that pays."""
+    velocity, count = problem.recording.velocity, len(bump.nonlinear)
+    speed, used = jnp.abs(velocity), jnp.any(roots > 0, axis=0)
+    slowest = jnp.min(jnp.where(used, speed, jnp.inf))
+    slowest = jnp.where(jnp.isfinite(slowest), slowest, 1.0)
+    speed = jnp.where(used, speed, slowest)
+    moments = reduced.moments(columns, target, roots, jnp.sign(velocity))
+    straight = all(isinstance(t, Coulomb | Viscous) for term in linear for t in summands(term))
+    if straight and grid.shape[0] >= compress.LEAST_POINTS:
+        narrowest = problem.box[0, 0]
+        panels = compress.edges(slowest, jnp.max(speed), narrowest)
+        moments = compress.compressed(moments, speed, panels)
+        speed = compress.nodes(panels)
+
+    def contrast(unit):
+        beta = reduced.decode(unit, problem.box[:, :count], problem.logarithmic[:count])
+        return bump.with_beta(beta).contrast(speed, slowest)
+
+    return reduced.grid_costs(contrast, grid, moments)
+
+
+def _general_sides(problem, bumps, grid, columns, target, roots):
+    """The grid of several nonlinear columns, one direction after the other."""
+
+    def side(weigh):
+        basis = reduced.orthonormal(weigh[:, None] * columns)
+        left = reduced.project_out(basis, (weigh * target)[:, None])[:, 0]
+
+        def weighted(unit):
+            return weigh[:, None] * problem.columns(bumps, unit, grid.shape[1])
+
+        return reduced.general_grid_costs(weighted, grid, basis, left)
+
+    return jax.lax.map(side, roots)
 
 
 def _best(grid, costs):

@@ -12,9 +12,9 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 
 # Each room imports only from rooms before it. A new file gets its place here, or the test says so.
 ORDER = """
-    units recording terms signals models
+    units recording terms signals models catalogue effects
     columns delimited cleaning tables io
-    refine projections reduced uncertainty search identified identification selection online fleet
+    refine projections reduced compress uncertainty search identified identification selection online fleet
     control plant prediction simulation scenario
     explain concealed documents tabulate report export cli __main__
 """.split()

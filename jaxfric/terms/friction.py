@@ -3,6 +3,7 @@ Canudas de Wit, "A survey of models, analysis tools and compensation methods for
 machines with friction", Automatica 30(7), 1994, section 2.
 """
 
+from abc import abstractmethod
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -45,52 +46,83 @@ _STRIBECK_FORCE = (Parameter("stribeck_force", FORCE),)
 _STRIBECK_VELOCITY = Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds)
 
 
-class Gaussian(AbstractLaw):
+class AbstractBump(AbstractLaw):
+    """A Stribeck bump F = F_b sign(v) s(|v|), its shape s smooth at speeds above zero.
+
+    A concrete bump gives `shape`, and `contrast` for the search over β. Smooth means: at the
+    scale of |v| itself or of the Stribeck velocity, whichever is larger.
+    """
+
+    affine: ClassVar = _STRIBECK_FORCE
+
+    @abstractmethod
+    def shape(self, speed: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        """s at positive speeds, m/s."""
+
+    @abstractmethod
+    def contrast(self, speed: Float[Array, "*n"], slowest: Float[Array, ""]) -> Float[Array, "*n"]:
+        """A function that spans with the constant what s spans with it; zero at `slowest` > 0.
+
+        It neither underflows where the bump is narrow nor loses its variation in the rounding of
+        a constant where the bump is wide. `speed` is not below `slowest`, both in m/s.
+        """
+
+    def law(self, sample: Sample):
+        speed = jnp.abs(sample.velocity)
+        moving = speed > 0
+        shape = self.shape(jnp.where(moving, speed, jnp.ones_like(speed)))
+        return (jnp.where(moving, jnp.sign(sample.velocity) * shape, jnp.zeros_like(shape)),)
+
+
+class Gaussian(AbstractBump):
     """Stribeck bump F = F_b sign(v) exp(−(v/v_s)²) (Kim, Kim & Ha 2004, eq. 20).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = _STRIBECK_FORCE
     nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
 
-    def law(self, sample: Sample):
-        ratio = sample.velocity / self.stribeck_velocity
-        return (jnp.sign(sample.velocity) * jnp.exp(-(ratio**2)),)
+    def shape(self, speed):
+        return jnp.exp(-((speed / self.stribeck_velocity) ** 2))
+
+    def contrast(self, speed, slowest):
+        return jnp.expm1((slowest - speed) * (slowest + speed) / self.stribeck_velocity**2)
 
 
-class Lorentzian(AbstractLaw):
-    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha, eq. 29).
+class Lorentzian(AbstractBump):
+    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha 2004, eq. 29).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = _STRIBECK_FORCE
     nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
 
-    def law(self, sample: Sample):
-        ratio = sample.velocity / self.stribeck_velocity
-        return (jnp.sign(sample.velocity) / (1 + ratio**2),)
+    def shape(self, speed):
+        return 1 / (1 + (speed / self.stribeck_velocity) ** 2)
+
+    def contrast(self, speed, slowest):
+        return (slowest - speed) * (slowest + speed) / (self.stribeck_velocity**2 + speed**2)
 
 
-class Exponential(AbstractLaw):
+class Exponential(AbstractBump):
     """Stribeck bump F = F_b sign(v) exp(−|v|/v_s) (Tustin 1947).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = _STRIBECK_FORCE
     nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
 
-    def law(self, sample: Sample):
-        ratio = jnp.abs(sample.velocity) / self.stribeck_velocity
-        return (jnp.sign(sample.velocity) * jnp.exp(-ratio),)
+    def shape(self, speed):
+        return jnp.exp(-speed / self.stribeck_velocity)
+
+    def contrast(self, speed, slowest):
+        return jnp.expm1((slowest - speed) / self.stribeck_velocity)
 
 
-class Generalised(AbstractLaw):
+class Generalised(AbstractBump):
     """Stribeck bump F = F_b sign(v) exp(−|v/v_s|^δ) (Bo & Pavelescu 1982; δ from 1/2 to 2).
 
     `stribeck_velocity` v_s, m/s, and `stribeck_exponent` δ are nonlinear; NaN means "to be
@@ -99,15 +131,19 @@ class Generalised(AbstractLaw):
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
     stribeck_exponent: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = _STRIBECK_FORCE
     nonlinear: ClassVar = (
         _STRIBECK_VELOCITY,
         Parameter("stribeck_exponent", DIMENSIONLESS, lambda scales: (0.5, 2.0), logarithmic=False),
     )
 
-    def law(self, sample: Sample):
-        speed = jnp.abs(sample.velocity)
-        moving = speed > 0
-        ratio = jnp.where(moving, speed, jnp.ones_like(speed)) / self.stribeck_velocity
-        bump = jnp.exp(-jnp.exp(self.stribeck_exponent * jnp.log(ratio)))
-        return (jnp.where(moving, jnp.sign(sample.velocity) * bump, jnp.zeros_like(bump)),)
+    def shape(self, speed):
+        return jnp.exp(-self._power(speed / self.stribeck_velocity))
+
+    def contrast(self, speed, slowest):
+        # (v/v_s)^δ − (v₀/v_s)^δ, without taking the difference of two powers.
+        rise = jnp.expm1(self.stribeck_exponent * jnp.log1p((speed - slowest) / slowest))
+        return jnp.expm1(-self._power(slowest / self.stribeck_velocity) * rise)
+
+    def _power(self, ratio):
+        # jnp.power is an order of magnitude slower.
+        return jnp.exp(self.stribeck_exponent * jnp.log(ratio))
