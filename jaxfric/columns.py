@@ -215,7 +215,8 @@ def units(
     force, position = _stated("force", chosen, scale), _stated("position", chosen, scale)
     if position is None and (velocity := _stated("velocity", chosen, scale)):
         position = velocity.removesuffix("/s") if velocity.endswith("/s") else None
-    words = _words(chosen["force"]) if scale.get("force") is None else []
+    named = "force" in chosen and scale.get("force") is None  # a set-point may come without
+    words = _words(chosen["force"]) if named else []
     if force is None:
         force = "N·m" if "torque" in words else "A" if "current" in words else None
     if force:

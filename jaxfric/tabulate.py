@@ -42,7 +42,7 @@ def identification(
     left to choose itself, so that the reason is told.
     """
     lines = _source(document)
-    lines += ["", f"model {document['name']}; {_how(document, automatic)}", ""]
+    lines += ["", *_wrapped(f"model {document['name']}; {_how(document, automatic)}"), ""]
     lines += _rows(document["parameters"], truth)
     lines += ["", f"force error {document['force_error']:.2%}   result {document['result']}"]
     if document["result"] != "successful":
@@ -176,13 +176,13 @@ def _remarks(parameters: Mapping[str, Any]) -> list[str]:
         )
     if faint:
         lines += _wrapped(
-            f"{' and '.join(faint)} cannot be told from zero, so its velocity means nothing: a "
-            "simpler model may do (--model best lets held-out data choose)."
+            f"{' and '.join(faint)} cannot be told from zero, nor then its velocity: a simpler "
+            "model may do (--model best lets held-out data choose)."
         )
     if wrong:
         lines += _wrapped(
-            f"{' and '.join(wrong)} negative, which no passive axis is: check the signs of force "
-            "and motion, and whether a current or torque limit or a load was at work."
+            f"{' and '.join(wrong)} negative, as in no passive axis: the sign of force or motion "
+            "is wrong, or a force that the model lacks (load, cogging) is taken for it."
         )
     return lines
 

@@ -14,7 +14,7 @@ from ..identification import identify as identify_recording
 from ..identified import Identified
 from ..io import read_with_notes, write_bytes, write_table, write_text
 from ..models import Model
-from ..prediction import predict as predict_force
+from ..prediction import predict as predict_force, relative_error
 from ..projections import ClosedWindows, WeakForm
 from ..recording import Recording, pad
 from ..report import pictures
@@ -148,16 +148,21 @@ def predict(arguments: Namespace) -> int:
     model = _load(arguments.model)
     recording, notes = read(arguments.file, arguments)
     recording = _in_units(recording, model, arguments)
-    force = np.asarray(predict_force(model, uniform(recording)))[: recording.num_samples]
-    measured, mask = np.asarray(recording.force), np.asarray(recording.mask)
-    columns = {"time": recording.time, "force": force, "measured_force": measured}
+    needed = model.term.coordinates - {"acceleration", "time", "position", "velocity"}
+    if missing := sorted(needed - set(recording.channels)):
+        raise ValueError(
+            f"{arguments.file}: the model needs {', '.join(missing)}. Name the columns: "
+            f"--columns {','.join(f'{role}=NAME' for role in missing)}."
+        )
+    prepared = prepare(uniform(recording))
+    force = np.asarray(predict_force(model, prepared))[: recording.num_samples]
+    columns = {"time": recording.time, "force": force, "measured_force": recording.force}
     write_table(arguments.out, columns)
     for note in notes:
         print(f"  {note}")
-    size = np.linalg.norm(measured[mask])
-    error = np.linalg.norm((measured - force)[mask])
-    share = f"{error / size:.2%}" if size > 0 else "undefined: the measured force is zero"
-    print(f"{arguments.out}: {force.size} samples; norm(measured - predicted)/norm = {share}")
+    error = float(relative_error(model, prepared))
+    share = f"{error:.2%}" if np.isfinite(error) else "undefined: no slip, or no force"
+    print(f"{arguments.out}: {force.size} samples; force error {share}")
     return 0
 
 
