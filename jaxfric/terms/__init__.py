@@ -1,5 +1,12 @@
 """The physics: one law, one class, one displayed equation."""
 
+from .actuator import (
+    ActuatorDeadband as ActuatorDeadband,
+    ActuatorLag as ActuatorLag,
+    ActuatorSaturation as ActuatorSaturation,
+    GainAsymmetry as GainAsymmetry,
+    TransportDelay as TransportDelay,
+)
 from .base import (
     AbstractLaw as AbstractLaw,
     AbstractTerm as AbstractTerm,
@@ -7,6 +14,14 @@ from .base import (
     Parameter as Parameter,
     Sample as Sample,
     Sum as Sum,
+)
+from .curvature import (
+    CrossAxis as CrossAxis,
+    FrictionAsymmetry as FrictionAsymmetry,
+    LoadDependentFriction as LoadDependentFriction,
+    PowerLaw as PowerLaw,
+    QuadraticDrag as QuadraticDrag,
+    ShearThinning as ShearThinning,
 )
 from .friction import (
     Coulomb as Coulomb,
@@ -17,3 +32,30 @@ from .friction import (
     Viscous as Viscous,
 )
 from .inertia import Inertia as Inertia, Offset as Offset
+from .position import (
+    Cogging as Cogging,
+    EndStop as EndStop,
+    GravityUnbalance as GravityUnbalance,
+    HardeningSpring as HardeningSpring,
+    LowerEndStop as LowerEndStop,
+    PositionDependentFriction as PositionDependentFriction,
+    PositionDependentInertia as PositionDependentInertia,
+    Spring as Spring,
+    StickySpot as StickySpot,
+)
+from .presliding import (
+    AbstractMemory as AbstractMemory,
+    Dahl as Dahl,
+    FrictionalLag as FrictionalLag,
+    LuGre as LuGre,
+)
+from .table import Table as Table
+from .time import (
+    AbstractModulated as AbstractModulated,
+    DisturbancePulses as DisturbancePulses,
+    FrictionStep as FrictionStep,
+    LoadDrift as LoadDrift,
+    PeriodicDisturbance as PeriodicDisturbance,
+    ThermalDrift as ThermalDrift,
+)
+from .transmission import Backlash as Backlash, Compliance as Compliance

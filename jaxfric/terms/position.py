@@ -1,0 +1,228 @@
+"""Forces that depend on where the axis is.
+
+Every bound is a length that the recording itself gives: the stroke (range of the position), or
+the distance between two samples. `sin` and `cos` amplitudes are affine; amplitude and phase of a
+wave follow from them: A = √(a_sin² + a_cos²), φ = atan2(a_cos, a_sin).
+"""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..units import FORCE, INERTIA, POSITION, STIFFNESS, Dimension
+from .base import AbstractLaw, Parameter, Sample
+
+UNKNOWN = float("nan")
+POSITION_ONLY = frozenset({"position"})
+WITH_DIRECTION = frozenset({"position", "velocity"})
+
+
+def _shortest(scales):
+    """Two samples at the top speed: a shorter period is aliased there."""
+    return 2 * scales.fastest * scales.interval
+
+
+def _stroke(scales):
+    return scales.high - scales.low
+
+
+def _pitch_bounds(scales):
+    """From the shortest period that is sampled to one whole period in the stroke."""
+    return _shortest(scales), _stroke(scales)
+
+
+def _long_bounds(scales):
+    """From one period in the stroke to an eighth of one.
+
+    There the sine spans ±π/8 about its middle and differs from a parabola by (π/8)³/6 = 1 %: a
+    longer period can no longer be told.
+    """
+    return _stroke(scales), 8 * _stroke(scales)
+
+
+def _any_period(scales):
+    """All of the two ranges above: short as a pitch, or longer than the stroke."""
+    return _shortest(scales), 8 * _stroke(scales)
+
+
+def _inside(scales):
+    """Somewhere in the stroke: outside, the place leaves no trace."""
+    return scales.low, scales.high
+
+
+def _spot_bounds(scales):
+    """From two samples at the top speed to a quarter of the stroke, beyond which it is no spot."""
+    return _shortest(scales), 0.25 * _stroke(scales)
+
+
+def wave(name: str, dimension: Dimension, harmonics: int = 1) -> tuple[Parameter, ...]:
+    """Affine parameters of a wave: sine and cosine amplitude of each harmonic."""
+    stems = [name if n == 1 else f"{name}_harmonic{n}" for n in range(1, harmonics + 1)]
+    return tuple(Parameter(f"{s}_{part}", dimension) for s in stems for part in ("sin", "cos"))
+
+
+def waves(argument, harmonics: int = 1):
+    """sin(n θ) and cos(n θ) of an angle θ = `argument`, rad, for n = 1 … `harmonics`."""
+    return tuple(f(n * argument) for n in range(1, harmonics + 1) for f in (jnp.sin, jnp.cos))
+
+
+class GravityUnbalance(AbstractLaw):
+    """Weight of an eccentric mass, at most one turn a stroke: F = A sin(2πx/L + φ).
+
+    `unbalance_period` L, m (2π rad on the turning axis itself). The force's constant part cannot
+    be told from an [`Offset`][jaxfric.terms.Offset].
+    """
+
+    unbalance_period: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("unbalance", FORCE)
+    nonlinear: ClassVar = (Parameter("unbalance_period", POSITION, _long_bounds),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * sample.position / self.unbalance_period)
+
+
+class Cogging(AbstractLaw):
+    """Detent force of a motor or mesh: F = Σ_n A_n sin(2πn x/p + φ_n), n = 1 … `harmonics`.
+
+    `pitch` p, m (Otten, de Vries, van Amerongen, Rankers & Gaal, "Linear motor motion control
+    using a learning feedforward controller", IEEE/ASME Trans. Mechatronics 2(3), 1997).
+    """
+
+    pitch: Float[Array, ""] | float = UNKNOWN
+    harmonics: int = eqx.field(static=True, default=1)
+    nonlinear: ClassVar = (Parameter("pitch", POSITION, _pitch_bounds),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    @property
+    def affine(self):
+        return wave("cogging", FORCE, self.harmonics)
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * sample.position / self.pitch, self.harmonics)
+
+
+class Spring(AbstractLaw):
+    """Linear spring: F = k (x − x₀).
+
+    `rest` x₀, m, is a given number: moving it adds a constant, which the offset or the two
+    Coulomb levels take up. A place inside the stroke keeps that constant small.
+    """
+
+    rest: float = eqx.field(static=True, default=0.0)
+    affine: ClassVar = (Parameter("stiffness", STIFFNESS),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return (sample.position - self.rest,)
+
+
+class HardeningSpring(AbstractLaw):
+    """Cubic part of a spring: F = k₃ (x − x₀)³ (Duffing 1918).
+
+    `spring_centre` x₀, m, lies in the stroke.
+    """
+
+    spring_centre: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("cubic_stiffness", Dimension(force=1, position=-3)),)
+    nonlinear: ClassVar = (Parameter("spring_centre", POSITION, _inside, logarithmic=False),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return ((sample.position - self.spring_centre) ** 3,)
+
+
+def _outer(scales):
+    """Anywhere but the outermost 2 %, where fewer samples than a fit needs would touch it."""
+    margin = 0.02 * _stroke(scales)
+    return scales.low + margin, scales.high - margin
+
+
+class EndStop(AbstractLaw):
+    """Elastic stop at the upper end of the stroke: F = k max(x − x_s, 0).
+
+    `stop_position` x_s, m. [`LowerEndStop`][] is its mirror image.
+    """
+
+    stop_position: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("stop_stiffness", STIFFNESS),)
+    nonlinear: ClassVar = (Parameter("stop_position", POSITION, _outer, logarithmic=False),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return (jnp.maximum(sample.position - self.stop_position, 0.0),)
+
+
+class LowerEndStop(AbstractLaw):
+    """Elastic stop at the lower end of the stroke: F = k min(x − x_s, 0).
+
+    `lower_stop_position` x_s, m.
+    """
+
+    lower_stop_position: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("lower_stop_stiffness", STIFFNESS),)
+    nonlinear: ClassVar = (Parameter("lower_stop_position", POSITION, _outer, logarithmic=False),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return (jnp.minimum(sample.position - self.lower_stop_position, 0.0),)
+
+
+class PositionDependentFriction(AbstractLaw):
+    """Coulomb level that varies along the stroke: F = A sin(2πx/L + φ) sign(v).
+
+    `friction_period` L, m.
+    """
+
+    friction_period: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("friction", FORCE)
+    nonlinear: ClassVar = (Parameter("friction_period", POSITION, _any_period),)
+    coordinates: ClassVar = WITH_DIRECTION
+
+    def law(self, sample: Sample):
+        angle = 2 * jnp.pi * sample.position / self.friction_period
+        return tuple(jnp.sign(sample.velocity) * part for part in waves(angle))
+
+
+class StickySpot(AbstractLaw):
+    """Extra friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
+
+    `spot_position` x₀, m; `spot_width` w, m.
+    """
+
+    spot_position: Float[Array, ""] | float = UNKNOWN
+    spot_width: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("spot_force", FORCE),)
+    nonlinear: ClassVar = (
+        Parameter("spot_position", POSITION, _inside, logarithmic=False),
+        Parameter("spot_width", POSITION, _spot_bounds),
+    )
+    coordinates: ClassVar = WITH_DIRECTION
+
+    def law(self, sample: Sample):
+        distance = (sample.position - self.spot_position) / self.spot_width
+        return (jnp.sign(sample.velocity) * jnp.exp(-0.5 * distance**2),)
+
+
+class PositionDependentInertia(AbstractLaw):
+    """Inertia that varies along the stroke: u = d(M₁v)/dt − ½ M₁′v², M₁ = A sin(2πx/L + φ).
+
+    Lagrange's equation for the kinetic energy ½ M₁(x) v². `inertia_period` L, m.
+    """
+
+    inertia_period: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("inertia", INERTIA)
+    nonlinear: ClassVar = (Parameter("inertia_period", POSITION, _any_period),)
+    coordinates: ClassVar = frozenset({"position", "velocity", "acceleration"})
+
+    def law(self, sample: Sample):
+        rate = 2 * jnp.pi / self.inertia_period
+        sine, cosine = waves(rate * sample.position)
+        half = 0.5 * rate * sample.velocity**2
+        return (-half * cosine, half * sine)
+
+    def impulse(self, sample: Sample):
+        angle = 2 * jnp.pi * sample.position / self.inertia_period
+        return tuple(part * sample.velocity for part in waves(angle))

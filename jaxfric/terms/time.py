@@ -1,0 +1,189 @@
+"""Forces that change with time, and terms that do."""
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..recording import Recording
+from ..units import FORCE, FREQUENCY, TIME
+from .base import AbstractLaw, AbstractTerm, Parameter, Sample
+from .friction import Coulomb, Viscous
+from .position import wave, waves
+
+UNKNOWN = float("nan")
+
+
+class AbstractModulated(AbstractTerm):
+    """A force law times a factor of time with one nonlinear parameter; `term` is the law.
+
+    A concrete class names its parameter in `parameter`, the field of the same name, gives the
+    `prefix` for the affine parameters, and `factor(time)`.
+    """
+
+    term: eqx.AbstractVar[AbstractTerm]
+    parameter: eqx.AbstractClassVar[Parameter]
+    prefix: eqx.AbstractClassVar[str]
+
+    def __check_init__(self):
+        if self.term.inertial:
+            raise ValueError(
+                f"{type(self).__name__} changes a force law in time; {type(self.term).__name__} "
+                "has momentum. Give friction, for instance terms.Viscous()."
+            )
+
+    @abstractmethod
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        """The factor at each time, s, dimensionless."""
+
+    @property
+    def affine(self):
+        return tuple(p._replace(name=f"{self.prefix}_{p.name}") for p in self.term.affine)
+
+    @property
+    def nonlinear(self):
+        inner = (p._replace(name=f"{self.prefix}_{p.name}") for p in self.term.nonlinear)
+        return (self.parameter, *inner)
+
+    @property
+    def coordinates(self):
+        return self.term.coordinates | {"time"}
+
+    @property
+    def inertial(self) -> bool:
+        return False
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return self.factor(recording.time)[:, None] * self.term.columns(recording)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return self.term.momentum(recording)
+
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        return jnp.zeros_like(recording.time)
+
+    def beta(self) -> Float[Array, " d"]:
+        own = jnp.asarray(getattr(self, self.parameter.name))[..., None]
+        return jnp.concatenate([own, self.term.beta()], axis=-1) if self.term.nonlinear else own
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractModulated":
+        name = self.parameter.name
+        where = lambda term: (getattr(term, name), term.term)  # noqa: E731
+        return eqx.tree_at(where, self, (beta[0], self.term.with_beta(beta[1:])))
+
+
+def _constant_bounds(scales):
+    """A fiftieth to three times the record.
+
+    Faster warming is over within a tenth of the record. Slower warming falls by x = 1/3 of an
+    exponent at most and differs from a straight line by x/8 = 4 % of that fall.
+    """
+    return 0.02 * scales.duration, 3 * scales.duration
+
+
+class ThermalDrift(AbstractModulated):
+    """Friction that falls as the machine warms: F = β g(v) exp(−(t − t₀)/τ), g the law `term`.
+
+    `time_constant` τ, s; `start` t₀, s, is a given number that only scales β.
+    """
+
+    term: AbstractTerm = Viscous()
+    time_constant: Float[Array, ""] | float = UNKNOWN
+    start: float = eqx.field(static=True, default=0.0)
+    parameter: ClassVar = Parameter("time_constant", TIME, _constant_bounds)
+    prefix: ClassVar = "thermal"
+
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        return jnp.exp(-(time - self.start) / self.time_constant)
+
+
+def _within(scales):
+    """Inside the record but its first and last 2 %, where one level rests on too few samples."""
+    margin = 0.02 * scales.duration
+    return scales.start + margin, scales.start + scales.duration - margin
+
+
+class FrictionStep(AbstractModulated):
+    """Friction that changes at one moment: F = ΔF g(v) 1(t > t_c), g the law `term`.
+
+    `step_time` t_c, s. The step is a straight ramp of `ramp` seconds, so that t_c can be refined;
+    give a length that the recording cannot resolve, or zero.
+    """
+
+    term: AbstractTerm = Coulomb()
+    step_time: Float[Array, ""] | float = UNKNOWN
+    ramp: float = eqx.field(static=True, default=0.0)
+    parameter: ClassVar = Parameter("step_time", TIME, _within, logarithmic=False)
+    prefix: ClassVar = "step"
+
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        late = time - self.step_time
+        if self.ramp == 0:
+            return (late > 0).astype(time.dtype)
+        return jnp.clip(late / self.ramp + 0.5, 0.0, 1.0)
+
+
+class LoadDrift(AbstractLaw):
+    """Constant force that wanders: F = Σ_n F_n P_n(τ), τ = 2 (t − t₀)/T − 1, n = 1 … `degree`.
+
+    P_n are Legendre's polynomials over the record that starts at `start` t₀ and lasts `duration`
+    T, s, both given numbers; n = 0 is the offset. Outside the record the ends' values hold.
+    """
+
+    start: float = eqx.field(static=True, default=0.0)
+    duration: float = eqx.field(static=True, default=1.0)
+    degree: int = eqx.field(static=True, default=3)
+    coordinates: ClassVar = frozenset({"time"})
+
+    @property
+    def affine(self):
+        return tuple(Parameter(f"load_drift_{n}", FORCE) for n in range(1, self.degree + 1))
+
+    def law(self, sample: Sample):
+        tau = jnp.clip(2 * (sample.time - self.start) / self.duration - 1, -1.0, 1.0)
+        polynomials = [jnp.ones_like(tau), tau]
+        for n in range(1, self.degree):  # Bonnet's recursion
+            newer = ((2 * n + 1) * tau * polynomials[-1] - n * polynomials[-2]) / (n + 1)
+            polynomials.append(newer)
+        return tuple(polynomials[1 : self.degree + 1])
+
+
+def _frequency_bounds(scales):
+    """From one and a half periods in the record to half of Nyquist's frequency.
+
+    Fewer periods are a drift; above, a force held over a sample is no longer the tone that acts.
+    """
+    return 1.5 / scales.duration, 0.25 / scales.interval
+
+
+class PeriodicDisturbance(AbstractLaw):
+    """A tone in time: F = A sin(2πf t + φ). `frequency` f, Hz."""
+
+    frequency: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("tone", FORCE)
+    nonlinear: ClassVar = (Parameter("frequency", FREQUENCY, _frequency_bounds),)
+    coordinates: ClassVar = frozenset({"time"})
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * self.frequency * sample.time)
+
+
+class DisturbancePulses(AbstractLaw):
+    """Isolated pushes: F = Σ_i A_i cos²(π (t − t_i)/(2w)) for abs(t − t_i) < w.
+
+    `times` t_i and `width` w, s, are given numbers.
+    """
+
+    times: tuple[float, ...] = eqx.field(static=True, converter=lambda t: tuple(map(float, t)))
+    width: float = eqx.field(static=True)
+    coordinates: ClassVar = frozenset({"time"})
+
+    @property
+    def affine(self):
+        return tuple(Parameter(f"pulse_{i + 1}", FORCE) for i in range(len(self.times)))
+
+    def law(self, sample: Sample):
+        places = [jnp.clip((sample.time - at) / self.width, -1.0, 1.0) for at in self.times]
+        return tuple(jnp.cos(0.5 * jnp.pi * place) ** 2 for place in places)

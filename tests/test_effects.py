@@ -1,0 +1,506 @@
+"""Every term of the missing physics has every property, and is found again where it was planted."""
+
+import dataclasses
+import json
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import catalogue, effects, models, signals, terms as T
+from jaxfric.control import PD, Encoder
+from jaxfric.identification import identify
+from jaxfric.projections import WeakForm
+from jaxfric.recording import Recording, stack
+from jaxfric.simulation import simulate
+from jaxfric.terms.base import Scales, bounds
+from jaxfric.units import Dimension, spell
+
+# Each with nonlinear parameters that suit the axis below, and an amplitude of about a tenth of
+# its Coulomb friction.
+CASES = {
+    "asymmetry": (T.FrictionAsymmetry(), (1.0, 3.0)),
+    "quadratic_drag": (T.QuadraticDrag(), (100.0,)),
+    "power_law": (T.PowerLaw(2.5, 0.2), (5.0,)),
+    "shear_thinning": (T.ShearThinning(0.05), (60.0,)),
+    "unbalance": (T.GravityUnbalance(0.14), (1.5, -0.8)),
+    "cogging": (T.Cogging(0.012), (0.6, 1.2)),
+    "cogging_3": (T.Cogging(0.012, 3), (0.6, 1.2, 0.3, -0.5, 0.2, 0.4)),
+    "spring": (T.Spring(0.01), (40.0,)),
+    "hardening_spring": (T.HardeningSpring(0.005), (2e4,)),
+    "end_stop": (T.EndStop(0.02), (80.0,)),
+    "lower_end_stop": (T.LowerEndStop(-0.02), (80.0,)),
+    "position_friction": (T.PositionDependentFriction(0.05), (0.9, 1.1)),
+    "sticky_spot": (T.StickySpot(0.01, 0.003), (2.0,)),
+    "position_inertia": (T.PositionDependentInertia(0.06), (0.4, 0.5)),
+    "load_friction": (T.LoadDependentFriction(), (0.1,)),
+    "recorded_load": (T.LoadDependentFriction("load"), (0.1,)),
+    "cross_axis": (T.CrossAxis(), (0.5, 8.0)),
+    "deadband": (T.ActuatorDeadband(), (1.5,)),
+    "saturation": (T.ActuatorSaturation(25.0), (0.2,)),
+    "gain_asymmetry": (T.GainAsymmetry(), (0.1,)),
+    "delay": (T.TransportDelay(), (0.002,)),
+    "lag": (T.ActuatorLag(), (0.002,)),
+    "dahl": (T.Dahl(0.002), (18.0,)),
+    "lugre": (T.LuGre(0.002, 0.02), (18.0, 5.0)),
+    "frictional_lag": (T.FrictionalLag(), (0.01,)),
+    "backlash": (T.Backlash(0.003), (3.0,)),
+    "compliance": (T.Compliance(), (1e-3,)),
+    "thermal_viscous": (T.ThermalDrift(T.Viscous(), 4.0), (15.0,)),
+    "thermal_coulomb": (T.ThermalDrift(T.Coulomb(), 3.0, start=-1.0), (2.0,)),
+    "thermal_stribeck": (T.ThermalDrift(T.Gaussian(0.05), 3.0), (5.0,)),
+    "friction_step": (T.FrictionStep(T.Coulomb(), 6.3), (1.5,)),
+    "friction_ramp": (T.FrictionStep(T.Viscous(), 6.3, 0.2), (10.0,)),
+    "load_drift": (T.LoadDrift(0.0, 12.0, 3), (1.5, -1.0, 0.7)),
+    "tone": (T.PeriodicDisturbance(3.7), (0.7, 0.9)),
+    "pulses": (T.DisturbancePulses((2.2, 7.1), 0.2), (3.0, -3.0)),
+    "table_position": (T.Table("position", (-0.03, -0.01, 0.01, 0.03)), (1.0, -1.0, 2.0)),
+    "table_directional": (
+        T.Directional(T.Table("position", (-0.03, 0.0, 0.03))), (1.0, -1.0, 2.0, 1.0)
+    ),
+}  # fmt: skip
+TERMS = {name: term for name, (term, _) in CASES.items()}
+SCALES = Scales(*(jnp.asarray(x) for x in (0.001, 0.2, -0.04, 0.04, 20.0, 0.0, 12.0, 1e-3)))
+
+each_term = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)
+each_case = pytest.mark.parametrize(("term", "alpha"), CASES.values(), ids=CASES)
+
+
+def motion(force=1.0, position=1.0, count=12):
+    """Both directions, rest and reversals, with every channel, in units of any size."""
+    t = np.linspace(0.0, 6.0, count)
+    x = 0.03 * position * np.sin(1.3 * t)
+    v = 0.039 * position * np.cos(1.3 * t)
+    v[4] = 0.0
+    channels = {
+        "predicted_force": force * 30 * np.sin(2 * t + 1),
+        "predicted_friction": force * (20 * np.sign(v) + 60 / position * v),
+        "predicted_jerk": position * 0.5 * np.cos(3 * t),
+        "neighbour_velocity": position * 0.1 * np.sin(2 * t),
+        "load": force * (5 + np.sin(t)),
+    }
+    return Recording(t, 0 * t, x, v, channels=channels)
+
+
+# ---- shapes, transformations ----
+
+
+@each_term
+def test_shapes_agree_with_the_names_and_all_is_finite(term):
+    recording = motion()
+    for value in (term.columns(recording), term.momentum(recording)):
+        assert value.shape == (recording.num_samples, len(term.affine))
+        assert bool(jnp.all(jnp.isfinite(value)))
+    assert not np.any(term.offset(recording))
+    assert term.beta().shape == (len(term.nonlinear),)
+    assert term.inertial == bool(jnp.any(term.momentum(recording) != 0))
+    names = [p.name for p in (*term.affine, *term.nonlinear)]
+    assert len(set(names)) == len(names)
+
+
+@each_term
+def test_jit_and_vmap_change_nothing(term):
+    rows = [motion(), motion(2.0, 0.5), motion(1.0, 1.3)]
+    apart = jnp.stack([term.columns(recording) for recording in rows])
+    compiled = eqx.filter_jit(lambda t, r: jax.vmap(lambda one: t.columns(one))(r))
+    np.testing.assert_allclose(compiled(term, stack(rows)), apart, rtol=1e-12, atol=1e-14)
+
+
+@each_term
+def test_derivative_by_beta_agrees_with_finite_differences(term):
+    beta, recording = term.beta(), motion()
+    for part in ("columns", "momentum"):
+        columns = jax.jit(lambda beta, part=part: getattr(term.with_beta(beta), part)(recording))
+        slopes = jax.jacfwd(columns)(beta)
+        for i, size in enumerate(beta):
+            step = jnp.zeros_like(beta).at[i].set(1e-6 * size)
+            expected = (columns(beta + step) - columns(beta - step)) / (2e-6 * size)
+            scale = 1 + float(jnp.max(jnp.abs(slopes[..., i])))
+            np.testing.assert_allclose(slopes[..., i], expected, rtol=1e-5, atol=1e-6 * scale)
+
+
+@each_term
+def test_reverse_mode_is_finite(term):
+    slope = jax.grad(lambda b: jnp.sum(term.with_beta(b).columns(motion()) ** 2))(term.beta())
+    assert bool(jnp.all(jnp.isfinite(slope)))
+
+
+@each_term
+def test_single_precision_stays_single(term):
+    with jax.enable_x64(False):
+        assert term.columns(motion()).dtype == jnp.float32
+        assert term.momentum(motion()).dtype == jnp.float32
+
+
+# ---- structure ----
+
+
+@each_case
+def test_json_gives_the_term_back(term, alpha):
+    model = models.Model(term, jnp.asarray(alpha), (("force", "N·m"), ("position", "rad")))
+    again = models.Model.from_dict(json.loads(json.dumps(model.to_dict(), allow_nan=False)))
+    assert jax.tree.structure(again.term) == jax.tree.structure(term)
+    assert again.term.affine == term.affine
+    np.testing.assert_array_equal(again.force(motion()), model.force(motion()))
+    np.testing.assert_array_equal(again.momentum(motion()), model.momentum(motion()))
+
+
+@each_term
+def test_the_leaves_are_the_nonlinear_parameters(term):
+    assert len(jax.tree.leaves(term)) == len(term.nonlinear)
+    wanted = 0.1 + jnp.arange(len(term.nonlinear), dtype=float)
+    np.testing.assert_array_equal(term.with_beta(wanted).beta(), wanted)
+
+
+@each_term
+def test_every_nonlinear_parameter_has_a_compact_set_around_its_value(term):
+    lower, upper = bounds(term, SCALES)
+    assert bool(jnp.all((lower < upper) & jnp.isfinite(lower) & jnp.isfinite(upper)))
+    for parameter, low in zip(term.nonlinear, lower, strict=True):
+        assert not parameter.logarithmic or float(low) > 0
+    assert bool(jnp.all((term.beta() >= lower) & (term.beta() <= upper)))
+
+
+@each_term
+def test_no_term_passes_for_a_function_of_velocity_that_is_none(term):
+    """Lemma 1 must not be used where it does not hold: columns at equal velocity must be equal."""
+    two = motion()
+    other = dataclasses.replace(
+        two,
+        time=two.time + 0.7,
+        position=two.position + 0.011,
+        velocity=two.velocity[::-1],
+        channels={name: 1.1 * channel for name, channel in two.channels.items()},
+    )
+    same = np.allclose(term.columns(two), term.columns(other)[::-1], rtol=1e-9)
+    same &= np.allclose(term.momentum(two), term.momentum(other)[::-1], rtol=1e-9)
+    assert (term.coordinates <= {"velocity"}) == same
+
+
+# ---- units ----
+
+
+def rescaled(term, force, position):
+    """The term with every nonlinear and given number in units 1/force and 1/position as large."""
+    factors = [force**p.dimension.force * position**p.dimension.position for p in term.nonlinear]
+    term = term.with_beta(term.beta() * jnp.asarray(factors)) if factors else term
+    if isinstance(term, T.Table):
+        return T.Table(term.coordinate, tuple(position * k for k in term.knots))
+    if isinstance(term, T.Directional):
+        return T.Directional(rescaled(term.positive, force, position))
+    if isinstance(term, T.Spring):
+        return T.Spring(position * term.rest)
+    if isinstance(term, T.PowerLaw):
+        return T.PowerLaw(term.exponent, position * term.unit_speed)
+    return term
+
+
+@each_case
+@pytest.mark.parametrize("factors", [(1e3, 1e6), (1e-3, 57.3)], ids=["mN_um", "kN_deg"])
+def test_the_force_is_the_same_in_any_unit(term, alpha, factors):
+    force, position = factors
+    kinds = [p.dimension for p in term.affine]
+    scaled = [a * force**d.force * position**d.position for a, d in zip(alpha, kinds, strict=True)]
+    for part in ("columns", "momentum"):
+        here = getattr(term, part)(motion()) @ jnp.asarray(alpha)
+        there = rescaled(term, force, position)
+        there = getattr(there, part)(motion(force, position)) @ jnp.asarray(scaled)
+        np.testing.assert_allclose(there, force * here, rtol=1e-9, atol=1e-9 * force)
+
+
+@each_term
+def test_every_unit_can_be_spelled(term):
+    for parameter in (*term.affine, *term.nonlinear):
+        assert isinstance(parameter.dimension, Dimension)
+        assert spell(parameter.dimension)
+
+
+# ---- limits, by hand ----
+
+
+def at(t=0.0, x=0.0, v=1.0, **channels):
+    return Recording(
+        [t], [0.0], [x], [v], channels={name: [float(c)] for name, c in channels.items()}
+    )
+
+
+def column(term, recording, k=0):
+    return float(term.columns(recording)[0, k])
+
+
+def test_values_by_hand():
+    assert column(T.Cogging(0.01), at(x=0.0025)) == pytest.approx(1.0)
+    assert column(T.Cogging(0.01, 2), at(x=0.00125), 2) == pytest.approx(1.0)
+    assert column(T.Spring(0.5), at(x=2.0)) == 1.5
+    assert column(T.HardeningSpring(1.0), at(x=3.0)) == 8.0
+    assert [column(T.EndStop(1.0), at(x=x)) for x in (0.5, 1.5)] == [0.0, 0.5]
+    assert [column(T.LowerEndStop(1.0), at(x=x)) for x in (0.5, 1.5)] == [-0.5, 0.0]
+    assert column(T.StickySpot(1.0, 0.1), at(x=1.0, v=-2.0)) == -1.0
+    assert column(T.QuadraticDrag(), at(v=-3.0)) == -9.0
+    assert column(T.PowerLaw(3.0, 2.0), at(v=-4.0)) == pytest.approx(-8.0)
+    assert column(T.ShearThinning(1.0), at(v=1.0)) == 0.5
+    assert column(T.ActuatorSaturation(2.0), at(predicted_force=-5.0)) == -3.0
+    assert column(T.GainAsymmetry(), at(predicted_force=-5.0)) == 0.0
+    assert column(T.LoadDependentFriction("load"), at(v=-1.0, load=-7.0)) == -7.0
+    assert column(T.ThermalDrift(T.Viscous(), 2.0, start=1.0), at(t=3.0, v=2.0)) == pytest.approx(
+        2 * np.exp(-1)
+    )
+    assert [column(T.FrictionStep(T.Coulomb(), 1.0), at(t=t)) for t in (0.9, 1.1)] == [0.0, 1.0]
+    assert column(T.LoadDrift(0.0, 2.0, 2), at(t=1.0), 1) == -0.5
+    assert column(T.DisturbancePulses((1.0,), 0.5), at(t=1.25)) == pytest.approx(0.5)
+
+
+def test_position_dependent_inertia_is_lagrange():
+    """d(M₁v)/dt − ½M₁′v² against the Lagrangian of ½M₁(x)v², by automatic differentiation."""
+    term, alpha = T.PositionDependentInertia(0.3), jnp.asarray([0.7, -0.4])
+
+    def path(t):
+        return jnp.sin(2 * t) + 0.3 * t**2
+
+    def mass(x):
+        return alpha[0] * jnp.sin(2 * jnp.pi * x / 0.3) + alpha[1] * jnp.cos(2 * jnp.pi * x / 0.3)
+
+    def energy(x, v):
+        return 0.5 * mass(x) * v**2
+
+    def moving(t):
+        return (
+            at(0.0, 0.0, 0.0)
+            if t is None
+            else Recording(
+                jnp.stack([t]), jnp.zeros(1), jnp.stack([path(t)]), jnp.stack([jax.grad(path)(t)])
+            )
+        )
+
+    def lagrange(t):
+        def momentum(t):
+            return jax.grad(energy, argnums=1)(path(t), jax.grad(path)(t))
+
+        return jax.grad(momentum)(t) - jax.grad(energy)(path(t), jax.grad(path)(t))
+
+    t = jnp.asarray(0.37)
+    rate = jax.grad(lambda t: (term.momentum(moving(t)) @ alpha)[0])(t)
+    force = rate + (term.columns(moving(t)) @ alpha)[0]
+    assert float(force) == pytest.approx(float(lagrange(t)), rel=1e-10)
+
+
+def test_a_table_takes_its_knots_and_stays_constant_outside():
+    table = T.Table("position", (0.0, 1.0, 3.0))
+    alpha = jnp.asarray([2.0, 5.0])
+    x = jnp.asarray([-1.0, 0.0, 0.5, 1.0, 2.0, 3.0, 9.0])
+    recording = Recording(x, 0 * x, x, 0 * x)
+    np.testing.assert_allclose(table.columns(recording) @ alpha, [0, 0, 1, 2, 3.5, 5, 5])
+
+
+def test_waste_is_refused_with_a_remedy():
+    with pytest.raises(ValueError, match="above the one before"):
+        T.Table("position", (0.0, 0.0))
+    with pytest.raises(ValueError, match="has momentum"):
+        T.ThermalDrift(T.Inertia())
+    with pytest.raises(ValueError, match="predicted_force.*channels="):
+        T.ActuatorDeadband().columns(at())
+
+
+def test_presliding_vanishes_far_from_a_reversal_and_starts_at_minus_two():
+    t = np.linspace(0.0, 2.0, 4001)
+    v = np.where(t < 1.0, -1.0, 1.0)
+    recording = Recording(t, 0 * t, velocity=v)
+    force = np.asarray(T.Dahl(0.01).columns(recording)[:, 0])
+    assert abs(force[1999]) < 1e-12
+    # z relaxes as exp(−distance/x_d): −2 e⁻¹ at the distance x_d after the reversal.
+    after = np.interp(1.0 + 0.01, t, force)
+    assert after == pytest.approx(-2 * np.exp(-1), rel=0.03)
+    assert abs(force[-1]) < 1e-12
+
+
+def test_presliding_depends_on_distance_not_on_speed():
+    t = np.linspace(0.0, 2.0, 4001)
+    v = np.where(t < 1, -1.0, 1.0)
+    slow, fast = Recording(t, 0 * t, velocity=v), Recording(t / 7, 0 * t, velocity=7 * v)
+    for term in (T.Dahl(0.01), T.LuGre(0.01, 1e9)):
+        np.testing.assert_allclose(term.columns(slow), term.columns(fast), atol=1e-9)
+
+
+def test_backlash_acts_inside_the_gap_and_nowhere_else():
+    t = np.linspace(0.0, 2.0, 4001)
+    x = np.abs(t - 1.0)
+    recording = Recording(t, 0 * t, x, np.sign(t - 1.0))
+    inside = -np.asarray(T.Backlash(0.05).columns(recording)[:, 0]) * np.sign(t - 1.0)
+    reversal = (t > 1.0005) & (t < 1.0995)
+    assert np.all(inside[t < 0.9995] < 1e-9)
+    assert np.all(inside[t > 1.1005] < 1e-9)
+    # Of ∫ 1 − (w/δ)⁸ over the gap, 8/9 of its width is left.
+    share = np.sum(inside[reversal]) * 0.0005 / 0.1
+    assert share == pytest.approx(8 / 9, rel=0.01)
+
+
+def test_a_memory_starts_anew_in_each_segment():
+    recording = motion(count=40)
+    segment = np.arange(40) // 20
+    both = dataclasses.replace(recording, segment=segment, num_segments=2)
+    second = jax.tree.map(lambda a: a[20:], recording)
+    for term in (T.Dahl(0.002), T.LuGre(0.002, 0.02), T.Backlash(0.003)):
+        np.testing.assert_allclose(term.columns(both)[20:], term.columns(second), atol=1e-12)
+
+
+# ---- planted and found ----
+
+BASE = {
+    "inertia": 12.0, "coulomb+": 20.0, "viscous+": 60.0, "coulomb-": 18.0, "viscous-": 80.0,
+}  # fmt: skip
+
+
+def reference(rate):
+    time = np.arange(0, 12 * rate) / rate
+    tones = ((0.03, 0.31, 0.0), (0.012, 0.83, 1.0), (0.004, 4.3, 2.0))
+    goal = sum(a * np.sin(2 * np.pi * f * time + p) for a, f, p in tones)
+    speed = sum(2 * np.pi * a * f * np.cos(2 * np.pi * f * time + p) for a, f, p in tones)
+    return Recording(time, 0 * time, goal, speed)
+
+
+def with_predictions(run, model):
+    """The channels that the explanation derives from a simulation of the base, here from truth."""
+    rate = 1.0 / float(signals.interval(run))
+    v = np.asarray(run.velocity)
+    acceleration = np.gradient(v) * rate
+    friction = np.asarray(model.force(run))
+    inertia = float(model.parameters["inertia"])
+    other = 0.1 * np.sin(2 * np.pi * 0.47 * np.asarray(run.time))
+    channels = {
+        "predicted_force": inertia * acceleration + friction,
+        "predicted_friction": friction + 8 * np.sign(v) * np.exp(-((v / 0.02) ** 2)),
+        "predicted_jerk": np.gradient(acceleration) * rate,
+        "neighbour_velocity": other,
+        "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
+    }
+    return dataclasses.replace(run, channels={k: jnp.asarray(c) for k, c in channels.items()})
+
+
+RATES = [
+    pytest.param(1000.0, id="1kHz"),
+    pytest.param(4000.0, id="4kHz", marks=pytest.mark.slow),
+]
+
+
+@pytest.fixture(scope="module", params=RATES)
+def healthy(request):
+    """A closed-loop run of the base, its true motion, and what an encoder of 0.1 µm shows of it."""
+    model = models.from_parameters(models.coulomb_viscous(), BASE)
+    loop = PD(12.0 * 60.0**2, 2 * 12.0 * 60.0)
+    run = simulate(model, reference(request.param), loop)
+    run = with_predictions(dataclasses.replace(run, channels={}), model)
+    inertial = np.gradient(np.asarray(run.velocity), np.asarray(run.time)) * BASE["inertia"]
+    run = dataclasses.replace(run, force=inertial + model.force(run))
+    counts = Encoder(1e-7, 5e-8)
+    noise = counts.draw(jax.random.key(0), run.num_samples, run.time.dtype)
+    seen = dataclasses.replace(run, position=counts.read(run.position, noise), velocity=None)
+    return run, signals.prepare(seen)
+
+
+def planted(healthy, term, alpha, noise=0.5):
+    """What would be recorded if the term acted as well; force noise in N."""
+    true, seen = healthy
+    alpha = jnp.asarray(alpha)
+    momentum = np.asarray(term.momentum(true) @ alpha)
+    extra = np.gradient(momentum, np.asarray(true.time)) + np.asarray(term.columns(true) @ alpha)
+    rng = np.random.default_rng(1)
+    force = np.asarray(true.force) + extra + noise * rng.standard_normal(extra.size)
+    return dataclasses.replace(seen, force=jnp.asarray(force))
+
+
+@each_case
+def test_a_planted_term_comes_back(healthy, term, alpha):
+    """Weak form, noisy encoder and force, β known: the term's force to 5 %.
+
+    Only what the base cannot imitate can come back, so both the planted and the found force are
+    judged by their part orthogonal to the base.
+    """
+    base, expected = models.coulomb_viscous(), np.asarray(alpha)
+    if isinstance(term, T.FrictionAsymmetry):  # a base with two directions has it already
+        base = T.Inertia() + T.Coulomb() + T.Viscous()
+        expected = expected + [1.0, -10.0]  # half the difference of BASE's directions
+    recording = planted(healthy, term, alpha)
+    width = signals.kernel_half_width(recording)
+    rows = WeakForm(width).rows(recording, signals.scales(recording))
+    root = np.sqrt(np.asarray(rows.positive + rows.negative))[:, None]
+    target = root[:, 0] * np.asarray(rows.target)
+    basis = np.linalg.qr(root * np.asarray(rows.columns(base, recording)))[0]
+    own = root * np.asarray(rows.columns(term, recording))
+    size = np.linalg.norm(own, axis=0)
+    own = own - basis @ (basis.T @ own)
+    found = np.linalg.lstsq(own / size, target, rcond=None)[0] / size
+    # A dead-band is Coulomb friction, a load on the force is a gain, unless braking is harder
+    # than friction: without this the test would divide nothing by nothing.
+    assert np.linalg.norm(own @ expected) > 1e-3 * np.linalg.norm(size * expected)
+    assert np.linalg.norm(own @ (found - expected)) < 0.05 * np.linalg.norm(own @ expected)
+
+
+# The nonlinear parameter unknown: bounds where the default grid would step over a narrow valley.
+SEARCHED = {
+    "cogging": {"pitch": (0.008, 0.02)},
+    "sticky_spot": {},
+    "dahl": {},
+    "friction_ramp": {},
+    "tone": {"frequency": (3.0, 4.5)},
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEARCHED)
+def test_identify_finds_the_nonlinear_parameters_too(healthy, name):
+    term, alpha = CASES[name]
+    recording = planted(healthy, term, alpha)
+    found = identify(models.coulomb_viscous() + term, recording, bounds=SEARCHED[name])
+    for parameter, value in zip(term.affine, alpha, strict=True):
+        estimate = found.parameters[parameter.name]
+        assert float(estimate.value) == pytest.approx(value, rel=0.1, abs=0.1), parameter.name
+    for parameter, value in zip(term.nonlinear, term.beta(), strict=True):
+        estimate = found.parameters[parameter.name]
+        assert float(estimate.value) == pytest.approx(float(value), rel=0.1), parameter.name
+    assert float(found.parameters["inertia"].value) == pytest.approx(BASE["inertia"], rel=0.01)
+
+
+# ---- the catalogue ----
+
+
+def test_the_catalogue_holds_together():
+    reference_names = (
+        "parameter_mismatch asymmetric_friction stribeck viscous_nonlinearity gravity_unbalance "
+        "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
+        "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
+        "compliance transport_delay actuator_lag actuator_deadband actuator_saturation "
+        "gain_asymmetry thermal_drift friction_step load_drift periodic_disturbance "
+        "disturbance_pulses cross_axis"
+    )
+    assert list(effects.EFFECTS) == reference_names.split()
+    for effect in catalogue.CATALOGUE:
+        assert set(effect.confusable_with) <= set(effects.EFFECTS) - {effect.name}
+        assert effect.equation
+        for term in effect.shapes(SCALES):
+            assert effects.effect_of(term) == effect.name
+            lower, upper = bounds(term, SCALES)
+            assert bool(jnp.all(lower < upper))
+            needed = term.coordinates - {"time", "velocity", "acceleration"}
+            assert needed == effect.needs, effect.name
+    with pytest.raises(ValueError, match="there are .*cogging"):
+        effects.effect("gremlins")
+
+
+def test_terms_of_a_baseline_are_no_effect():
+    for term in (T.Inertia(), T.Offset(), T.Coulomb(), T.Viscous(), TERMS["table_position"]):
+        assert effects.effect_of(term) is None
+
+
+def test_a_wave_has_amplitude_and_phase():
+    """A sin(θ + φ) from its two columns; errors by the delta method against random draws."""
+    rng = np.random.default_rng(0)
+    spread = np.asarray([[0.02, 0.01], [0.01, 0.03]])
+    found = effects.wave(jnp.asarray(3.0), jnp.asarray(-4.0), jnp.asarray(spread))
+    assert float(found.amplitude) == pytest.approx(5.0)
+    assert float(found.phase) == pytest.approx(np.arctan2(-4.0, 3.0))
+    draws = rng.multivariate_normal([3.0, -4.0], spread, 20000)
+    assert float(found.amplitude_error) == pytest.approx(np.std(np.hypot(*draws.T)), rel=0.03)
+    phases = np.arctan2(draws[:, 1], draws[:, 0])
+    assert float(found.phase_error) == pytest.approx(np.std(phases), rel=0.03)
