@@ -21,6 +21,8 @@ from .terms.base import AbstractTerm, Directional, Sum
 # A tile of grid points times samples stays below this many numbers, so that it lives in the cache
 # and the memory does not grow with the grid: 2¹⁷ doubles are 1 MiB.
 TILE = 2**17
+# Places at which a bump is looked at to see what of it is constant or straight.
+PLACES = 512
 # Points for one, two, three, … nonlinear parameters: a ratio of 100 between the ends is then
 # stepped by under 4 %, resp. 7 %, finer than a bump's own relative width.
 GRID_POINTS = (128, 64, 24, 12, 8)
@@ -102,15 +104,15 @@ class Moments(eqx.Module):
     A bump e is any function given by its values at the `J` places; the rows of the batch (the
     directions of motion, eq. 24) differ in weights alone.
 
-    - `shared`: functions in the span of the columns without β, orthonormal under the weights
-      of all rows together, `(J, q)`, and `dual`, those times these weights.
+    - `shared`: functions in the span of the columns without β, `(J, q)`, and `dual`, the weights
+      that give a bump's coefficients on them from every `J // K`-th place, `(K, q)`.
     - `against`: for each weighting, what e is multiplied with: its own orthonormal columns and
       the force less its part in them, weighted, `(R, q + 1, J)`.
     - `weights`: those of e², `(R, J)`. `whole`: the cost without a bump, N²·s, `(R,)`.
     """
 
     shared: Float[Array, "J q"]
-    dual: Float[Array, "J q"]
+    dual: Float[Array, "K q"]
     against: Float[Array, "R t J"]
     weights: Float[Array, "R J"]
     whole: Float[Array, " R"]
@@ -121,14 +123,18 @@ class Moments(eqx.Module):
         What all weightings can explain is first taken off the bump itself, so that the difference
         e·e − |Qᵀe|² does not cancel where the bump is nearly constant or straight.
         """
-        left = bumps - (bumps @ self.dual) @ self.shared.T
+        some = bumps[:, :: bumps.shape[1] // self.dual.shape[0]][:, : self.dual.shape[0]]
+        parts = some @ self.dual
+        left = bumps
+        for i in range(self.dual.shape[1]):
+            left = left - parts[:, i, None] * self.shared[None, :, i]
         height, length, count = *self.against.shape[:2], bumps.shape[0]
         products = self.against.reshape(height * length, -1) @ left.T
         products = products.reshape(height, length, count)
-        size = self.weights @ (left * left).T
+        size = jnp.stack([jnp.sum(w[None, :] * left * left, axis=1) for w in self.weights])
         rest = size - jnp.sum(products[:, :-1] ** 2, axis=1)
         # A bump inside the span leaves rounding of itself; its share of the cost is noise.
-        most = jnp.sum(self.weights, axis=1)[:, None] * jnp.max(bumps**2, axis=1)[None, :]
+        most = jnp.sum(self.weights, axis=1)[:, None] * jnp.max(some**2, axis=1)[None, :]
         eps = 1e3 * jnp.finfo(rest.dtype).eps
         visible = (rest > eps * size) & (rest > eps**2 * most)
         gain = jnp.where(visible, products[:, -1] ** 2 / jnp.where(visible, rest, 1.0), 0.0)
@@ -148,16 +154,31 @@ def moments(
     """
     bases = jax.vmap(lambda r: orthonormal(r[:, None] * columns))(roots)
     left = jax.vmap(lambda b, r: project_out(b, (r * target)[:, None])[:, 0])(bases, roots)
+    # A rough share is enough to take off, and any function of the span may be: few places do.
+    step = max(1, columns.shape[0] // PLACES)
     together = root(jnp.sum(roots**2, axis=0))
-    shared = orthonormal(together[:, None] * columns)
+    together = together[: columns.shape[0] // step * step : step]
+    signed = columns if parity is None else columns * parity[:, None]
+    some = together[:, None] * signed[: columns.shape[0] // step * step : step]
+    dual = orthonormal(some)
+    # The functions whose values at these places are the orthonormal ones.
+    function = signed @ _coefficients(some, dual)
+    dual = dual * together[:, None]
     against = jnp.concatenate([jnp.swapaxes(bases, 1, 2), left[:, None, :]], axis=1)
     against = against * roots[:, None, :]
-    used = jnp.where(together > 0, together, 1.0)
-    function, dual = shared / used[:, None], shared * together[:, None]
     if parity is not None:
         against = against * parity[None, None, :]
-        function, dual = function * parity[:, None], dual * parity[:, None]
     return Moments(function, dual, against, roots**2, jnp.sum(left**2, axis=1))
+
+
+def _coefficients(columns, basis):
+    """What makes the orthonormal basis of Gram-Schmidt out of the columns, `(p, p)`."""
+    upper = jnp.triu(basis.T @ columns)
+    idle = jnp.diagonal(upper) <= 0
+    eye = jnp.eye(columns.shape[1], dtype=columns.dtype)
+    full = jnp.where(idle[:, None] | idle[None, :], eye, upper)
+    inverse = jax.scipy.linalg.solve_triangular(full, eye)
+    return jnp.where(idle[None, :], 0.0, inverse)
 
 
 def grid_costs(

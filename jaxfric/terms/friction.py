@@ -57,7 +57,7 @@ class AbstractBump(AbstractLaw):
 
     @abstractmethod
     def shape(self, speed: Float[Array, "*n"]) -> Float[Array, "*n"]:
-        """s at positive speeds, m/s."""
+        """The shape s at positive speeds, m/s."""
 
     @abstractmethod
     def contrast(self, speed: Float[Array, "*n"], slowest: Float[Array, ""]) -> Float[Array, "*n"]:
@@ -91,7 +91,7 @@ class Gaussian(AbstractBump):
 
 
 class Lorentzian(AbstractBump):
-    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha 2004, eq. 29).
+    """Stribeck bump F = F_b sign(v) / (1 + (v/v_s)²) (Hess & Soom 1990; Kim, Kim & Ha, eq. 29).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
     """
