@@ -18,7 +18,7 @@ from .reduced import Moments
 ORDER = 20
 # 13 octaves from the finest panel to the fastest speed: a ratio of 8000.
 PANELS = 13
-# One pass over the samples costs about as much as 70 bumps; below this grid size it is not worth it.
+# One pass over the samples costs about as much as 70 bumps; smaller grids are not worth it.
 LEAST_POINTS = 256
 # Samples at a time: their 20 polynomials stay in the cache.
 _BLOCK = 1024
@@ -50,7 +50,7 @@ def nodes(panels: Float[Array, " P+1"]) -> Float[Array, " M"]:
 def compress(
     speed: Float[Array, " N"], values: Float[Array, "k N"], panels: Float[Array, " P+1"]
 ) -> Float[Array, "k M"]:
-    """Weights on the nodes with Σₙ values f(vₙ) = Σₘ weights f(ξₘ) for every f smooth on the panels.
+    """Weights on the nodes: Σₙ values f(vₙ) = Σₘ weights f(ξₘ) for every f smooth on the panels.
 
     **Arguments:** `speed`, m/s; `values`, what f is summed with, zero for samples out of the
     panels; `panels`, from [`edges`][].
@@ -86,8 +86,6 @@ def compressed(rows: Moments, speed: Float[Array, " N"], panels: Float[Array, " 
     sums = compress(speed, stacked, panels)
     against = sums[: directions * length].reshape(directions, length, -1)
     places = nodes(panels)
-    # Orthonormal under equal weights for each logarithmic step, which need not be the samples':
-    # any function of the span may be taken off.
     top = panels[-1]
     line = jnp.stack([jnp.ones_like(places), places / top], axis=1)
     weight = sums[directions * length :]

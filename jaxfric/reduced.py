@@ -216,8 +216,7 @@ def general_grid_costs(
 
 
 def _tiled(tile, grid, width):
-    """`tile` over pieces of the grid, side by side; the last one is filled up, so that one
-    program serves all."""
+    """`tile` over pieces of the grid, the last one filled up so that one program serves all."""
     count, dimensions = grid.shape
     batch = int(np.clip(TILE // max(1, width), 1, min(64, count)))
     pieces = -(-count // batch)
