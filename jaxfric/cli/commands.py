@@ -15,7 +15,7 @@ from ..identified import Identified
 from ..io import read_with_notes, write_bytes, write_table, write_text
 from ..models import Model
 from ..prediction import predict as predict_force, relative_error
-from ..projections import ClosedWindows, WeakForm
+from ..projections import AbstractProjection, ClosedWindows, WeakForm
 from ..recording import Recording, pad
 from ..report import pictures
 from ..selection import select
@@ -59,7 +59,7 @@ def fitted(
     if model == "best":
         model = select(recording).name
     prepared = prepare(uniform(recording))
-    chosen = None
+    chosen: AbstractProjection | None = None
     if projection == "closed-windows":
         chosen = ClosedWindows()
     elif projection == "weak-form":

@@ -2,22 +2,40 @@
 
 from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
 from ..identified import Identified
-from ..prediction import predict
+from ..projections import WeakForm
 from ..recording import Recording
 from ..uncertainty import student_quantile
 from ..units import VELOCITY, spell
 
-# Bins a direction: enough to show a bump, few enough that each holds many samples.
+# Bins a direction: enough to show a bump, few enough that each holds several rows.
 BINS = 30
-# A mean of fewer samples than this says nothing about their scatter.
-FEWEST = 8
+# A mean of fewer rows than this says nothing about their scatter.
+FEWEST = 3
 _COLOURS = {1: "#0b5fa5", -1: "#c4570a"}
+
+
+class _Rows(NamedTuple):
+    """Rows of the weak form, each of shape `(J,)`: what the force error is counted on.
+
+    Acceleration is on the kernel, so that nothing here is a noisy derivative.
+    """
+
+    time: np.ndarray
+    measured: np.ndarray
+    predicted: np.ndarray
+    friction: np.ndarray
+    velocity: np.ndarray
+    segment: np.ndarray
+    slip: np.ndarray
+    moving: np.ndarray
 
 
 def library():
@@ -45,27 +63,51 @@ def figure(found: Identified, recording: Recording):
     """
     picture = library()(figsize=(9, 9.5), layout="constrained")
     prepared = signals.prepare(recording)
-    force = np.asarray(predict(found.model, prepared))
+    width = signals.kernel_half_width(prepared)
+    rows = _Rows(*map(np.asarray, _rows(found.model, prepared, width)))
+    kernel = 2 * width * float(signals.interval(prepared))
     curve, time, rest = picture.subplots(3, 1, height_ratios=(6, 3, 2))
     rest.sharex(time)
-    _curve(curve, found, prepared, force)
-    _time(time, rest, found, prepared, force)
+    _curve(curve, found, prepared, rows)
+    unit = prepared.unit_names["force"]
+    _time(time, rest, rows, unit)
+    time.set_title(
+        f"Force, averaged over {1e3 * kernel:.3g} ms; force error {float(found.force_error):.2%}"
+    )
     return picture
 
 
-def _curve(axes, found: Identified, recording: Recording, predicted) -> None:
+@eqx.filter_jit
+def _rows(model, recording: Recording, width: int) -> _Rows:
+    rows = WeakForm(width).rows(recording, signals.scales(recording))
+    predicted = rows.columns(model.term, recording) @ model.alpha
+    velocity = recording.velocity
+    others = (model.friction(velocity), velocity, recording.segment, recording.mask)
+    columns = jnp.stack([x.astype(velocity.dtype) for x in others], 1)
+    friction, velocity, segment, valid = rows.project(columns).T
+    slip = rows.positive + rows.negative > 0
+    predicted = predicted + rows.offset(model.term, recording)
+    # A kernel over two segments, or over samples left out, belongs to none.
+    one = (jnp.abs(segment - jnp.round(segment)) < 1e-6) & (valid > 1 - 1e-6)
+    segment = jnp.where(one, jnp.round(segment), -1.0)
+    moving = rows.moving > 0
+    return _Rows(rows.time, rows.target, predicted, friction, velocity, segment, slip, moving)
+
+
+def _curve(axes, found: Identified, recording: Recording, rows: _Rows) -> None:
     units = recording.unit_names
-    measured, speed = _slip_force(found, recording, predicted)
+    measured = (rows.measured - rows.predicted + rows.friction)[rows.slip]
+    speed = rows.velocity[rows.slip]
+    slowest = float(signals.scales(recording).slowest)
     for sign, colour in _COLOURS.items():
         side = sign * speed > 0
         if not side.any():
             continue
         v, mean, spread = _bins(speed[side], measured[side])
-        label = "measured force less inertia: mean and standard deviation of a bin"
+        label = "measured force less inertia: mean and standard deviation"
         style = {"fmt": "o", "color": "0.35", "ms": 3, "lw": 0.8, "capsize": 1.5, "zorder": 2}
         axes.errorbar(v, mean, spread, label=label if sign > 0 else None, **style)
-        # From the slowest motion that counts as slip: below it there is nothing to compare with.
-        line = sign * np.geomspace(np.min(np.abs(speed[side])), np.max(np.abs(speed[side])), 400)
+        line = sign * np.geomspace(slowest, np.max(np.abs(speed[side])), 400)
         force = np.asarray(found.model.friction(jnp.asarray(line)))
         low, high = _band(found, line, force)
         axes.fill_between(line, low, high, color=colour, alpha=0.3, lw=0, zorder=1)
@@ -78,16 +120,6 @@ def _curve(axes, found: Identified, recording: Recording, predicted) -> None:
     axes.set_title(f"Friction of {Path(recording.source).name or 'the axis'}")
     axes.legend(fontsize=8, loc="upper left")
     axes.grid(color="0.93")
-
-
-def _slip_force(found: Identified, recording: Recording, predicted):
-    """Measured force less all that is not friction, and velocity, at the samples in slip."""
-    limits = signals.scales(recording)
-    velocity = np.asarray(recording.velocity)
-    friction = np.asarray(found.model.friction(recording.velocity))
-    rest = np.asarray(recording.force) - predicted + friction
-    slip = np.asarray(recording.mask) & (np.abs(velocity) > float(limits.slowest))
-    return rest[slip], velocity[slip]
 
 
 def _bins(speed, force):
@@ -127,27 +159,22 @@ def _band(found: Identified, velocity, force):
     return force - half, force + half
 
 
-def _time(axes, rest, found: Identified, recording: Recording, predicted) -> None:
-    mask, segment = np.asarray(recording.mask), np.asarray(recording.segment)
-    # One segment at most, the longest: clocks of others may start again.
-    longest = np.argmax(np.bincount(segment[mask])) if mask.any() else 0
-    here = np.flatnonzero(mask & (segment == longest))
-    here = slice(here[0], here[-1] + 1) if here.size else slice(0)
-    # What is left out leaves a gap in the lines.
-    time = np.where(mask, np.asarray(recording.time), np.nan)[here]
-    force, model = np.asarray(recording.force)[here], predicted[here]
-    unit = recording.unit_names["force"]
-    axes.plot(time, force, color="0.55", lw=1.8, label="measured")
-    axes.plot(time, model, color=_COLOURS[1], lw=0.7, label="model, inertia included")
-    many = np.unique(segment[mask]).size > 1
-    what = "longest segment" if many else "recording"
-    axes.set_title(f"Force over the {what}; force error {float(found.force_error):.2%}")
+def _time(axes, rest, rows: _Rows, unit: str) -> None:
+    # The longest segment only: the clocks of the others may start again. At rest friction is
+    # whatever holds the axis, which no model of slip says: there the lines have gaps.
+    used = rows.segment[rows.moving & (rows.segment >= 0)].astype(int)
+    here = rows.segment == (np.argmax(np.bincount(used)) if used.size else 0)
+    time, measured = rows.time[here], rows.measured[here]
+    model = np.where(rows.moving, rows.predicted, np.nan)[here]
+    axes.plot(time, measured, color="0.55", lw=1.8, label="measured")
+    axes.plot(time, model, color=_COLOURS[1], lw=0.8, label="model in motion, inertia included")
     axes.set_ylabel(f"force [{unit}]")
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.2 * (high - low))  # room for the legend
     axes.legend(fontsize=8, ncols=2, loc="upper center")
     axes.tick_params(labelbottom=False)
-    rest.plot(time, force - model, color="0.35", lw=0.6)
+    rest.plot(time, measured - model, color="0.35", lw=0.7)
     rest.axhline(0, color="0.8", lw=0.8, zorder=0)
-    rest.set_xlabel("time [s]")
+    several = " of the longest segment" if np.unique(used).size > 1 else ""
+    rest.set_xlabel(f"time{several} [s]")
     rest.set_ylabel(f"difference [{unit}]")
