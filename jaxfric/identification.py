@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import reduced, signals, uncertainty
+from . import reduced, signals, small, uncertainty
 from .identified import Identified, Result, raise_unless_successful
 from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
@@ -249,7 +249,7 @@ def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> F
     upper = jnp.triu(basis.T @ (columns / scale[None, :]))
     idle = jnp.diagonal(upper) <= 0
     upper = jnp.where(idle[:, None], jnp.eye(scale.shape[0], dtype=upper.dtype), upper)
-    return jax.scipy.linalg.solve_triangular(upper, basis.T @ target) / scale
+    return small.invert_upper(upper) @ (basis.T @ target) / scale
 
 
 def _mass(friction: Model, recording: Recording, weak: Rows):

@@ -15,6 +15,7 @@ import numpy as np
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
+from . import small
 from .refine import BoxGaussNewton
 from .terms.base import AbstractTerm, Directional, Sum
 
@@ -177,8 +178,7 @@ def _coefficients(columns, basis):
     idle = jnp.diagonal(upper) <= 0
     eye = jnp.eye(columns.shape[1], dtype=columns.dtype)
     full = jnp.where(idle[:, None] | idle[None, :], eye, upper)
-    inverse = jax.scipy.linalg.solve_triangular(full, eye)
-    return jnp.where(idle[None, :], 0.0, inverse)
+    return jnp.where(idle[None, :], 0.0, small.invert_upper(full))
 
 
 def grid_costs(

@@ -9,6 +9,8 @@ import jax.numpy as jnp
 import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
+from . import small
+
 
 class _Point(eqx.Module):
     """An accepted point: where, its cost ½|r|², gradient Jᵀr, and Gauss-Newton matrix JᵀJ."""
@@ -105,9 +107,10 @@ def _newton(point: _Point, secant, damping, lower, upper):
     full = (point.matrix + secant) * both
     largest = jnp.max(jnp.diagonal(point.matrix))
     rest = jnp.diag(1 - free) * largest
-    # Curvature that is not clearly positive would send the step uphill or far away.
-    scale = jnp.sqrt(jnp.diagonal(point.matrix) + jnp.finfo(place.dtype).tiny)
-    smallest = jnp.linalg.eigvalsh((full + rest) / (scale[:, None] * scale[None, :]))[0]
-    matrix = jnp.where(smallest > 0.05, full, point.matrix * both) + rest
     floor = jnp.diag(damping * jnp.diagonal(point.matrix) + 1e-14 * largest + 1e-300)
-    return -jnp.linalg.solve(matrix + floor.astype(place.dtype), gradient * free)
+    rest = rest + floor.astype(place.dtype)
+    step, pivot = small.solve_positive(full + rest, gradient * free)
+    plain, _ = small.solve_positive(point.matrix * both + rest, gradient * free)
+    # Curvature that is not clearly positive would send the step uphill or far away.
+    enough = jnp.all(jnp.diagonal(full + rest) > 0.05 * jnp.diagonal(point.matrix))
+    return -jnp.where(enough & (pivot > 0.05), step, plain)

@@ -119,7 +119,7 @@ def _(primals, tangents):
     free = (unit > 0) & (unit < 1) & (jnp.diagonal(hessian) > 0)
     free = free.astype(unit.dtype)
     hessian = hessian * (free[:, None] * free[None, :]) + jnp.diag(1 - free)
-    return unit, -jnp.linalg.solve(hessian, change * free)
+    return unit, -small.solve_positive(hessian, change * free)[0]
 
 
 def _grid_whole(problem: _Problem, points):

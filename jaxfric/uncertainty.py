@@ -14,6 +14,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from . import small
+from .reduced import orthonormal
+
 # Blocks a direction: enough that the spread of the votes is known to ±13 %, few enough that a
 # block spans many samples of the residual's correlation on any record worth identifying.
 BLOCKS = 32
@@ -71,15 +74,18 @@ def covariance(
     scale = jnp.linalg.norm(root * jacobian, axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     scaled = root * jacobian / scale[None, :]
-    _, singular, rotation = jnp.linalg.svd(jnp.linalg.qr(scaled, mode="r"))
-    seen = singular > jnp.sqrt(jnp.finfo(jacobian.dtype).eps)
-    inverse = jnp.where(seen, 1 / jnp.where(seen, singular, 1.0), 0.0)
-    whiten = inverse[:, None] * rotation
-    white = scaled @ whiten.T
+    white = orthonormal(scaled)
+    upper = jnp.triu(white.T @ scaled)
+    seen = jnp.diagonal(upper) > jnp.sqrt(jnp.finfo(jacobian.dtype).eps)
+    white = jnp.where(seen[None, :], white, 0.0)
+    identity = jnp.eye(scale.size, dtype=upper.dtype)
+    inverse = small.invert_upper(jnp.where(seen[:, None], upper, identity))
     votes = jax.ops.segment_sum(white * root * error[:, None], block, 2 * BLOCKS)
-    spread = whiten.T @ _without_own_pull(votes, _gram(white, block)).T
+    spread = inverse @ _without_own_pull(votes, _gram(white, block)).T
     matrix = spread @ spread.T / (scale[:, None] * scale[None, :])
-    hidden = jnp.sum(jnp.where(seen[:, None], 0.0, rotation**2), axis=0) > 1e-6
+    # A column that the others span, and every column that takes part in spanning it.
+    spanned = jnp.where(seen[None, :], 0.0, inverse)
+    hidden = jnp.max(jnp.abs(spanned), axis=1) > 1e-3
     return matrix + jnp.diag(jnp.where(hidden, jnp.inf, 0.0))
 
 
@@ -98,8 +104,11 @@ def _without_own_pull(
     """The votes that blocks would cast had they not taken part in the fit: (I − A_b)⁻¹ s_b.
 
     A block that alone determines a direction pulls the fit onto itself and shows no residual
-    there; its share is capped at 95 %, a factor of twenty.
+    there; A_b enters by 95 %, which limits what such a block is credited with to a factor of 20.
     """
-    share, axes = jnp.linalg.eigh(gram)
-    factor = 1 / (1 - jnp.clip(share, 0.0, 0.95))
-    return jnp.einsum("bij,bj,bkj,bk->bi", axes, factor, axes, votes)
+
+    def free(vote, own):
+        identity = jnp.eye(vote.size, dtype=vote.dtype)
+        return small.solve_positive(identity - 0.95 * own, vote)[0]
+
+    return jax.vmap(free)(votes, gram)
