@@ -28,7 +28,7 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
         motion = dataclasses.replace(prepared, position=prepared.velocity)
     choose = signals.choose_half_width if traced else signals._choose
     width = jax.lax.stop_gradient(choose(motion, reach))
-    span = width * signals.interval(prepared)
+    span = (width + 0.5) * signals.interval(prepared)
     momentum = model.momentum(prepared)
     rate = signals.local_quadratic(prepared, momentum, span, reach)[1]
     return model.force(prepared) + rate

@@ -96,7 +96,7 @@ class ClosedWindows(AbstractProjection):
         used = jnp.sum(positive) + jnp.sum(negative)
         first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
         windows = jnp.sum(first & (end > begin))
-        covered = used / jnp.where(slip > 0, slip, 1.0)
+        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
         moving = jnp.where(jnp.abs(recording.velocity) > scales.slowest, scales.interval, 0.0)
         moving = jnp.where(recording.mask, moving, 0.0)
         force, time = recording.force, recording.time
@@ -291,7 +291,8 @@ class WeakForm(AbstractProjection):
         sign = jnp.sign(positive - negative)
         windows = jnp.sum((sign != jnp.pad(sign[:-1], (1, 0))) & (sign != 0))
         slip = jnp.sum(jnp.where(moving, scales.interval, 0.0))
-        covered = (jnp.sum(positive) + jnp.sum(negative)) / jnp.where(slip > 0, slip, 1.0)
+        used = jnp.sum(positive) + jnp.sum(negative)
+        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
         mostly = jnp.where(whole & (sampled[:, 1] > 0.5), spacing, 0.0)
         time = filter_.gather(recording.time, 0)
         return Rows(sampled[:, 0], positive, negative, mostly, time, windows, covered, filter_)

@@ -122,9 +122,9 @@ def white_noise(recording: Recording, signal: Float[Array, " N"]) -> Float[Array
 
 def _derivative_weights(half_width: int, reach: int) -> np.ndarray:
     """Weights of the local quadratic slope on a clock of one second, centred in 2 reach + 1."""
-    offsets = np.arange(-reach, reach + 1) / half_width
+    offsets = np.arange(-reach, reach + 1) / (half_width + 0.5)
     weight = np.maximum(1 - offsets**2, 0.0) ** 4 * offsets
-    return weight / np.sum(weight * offsets) / half_width
+    return weight / np.sum(weight * offsets) / (half_width + 0.5)
 
 
 def _ladder(size: int, reach: int) -> tuple[int, ...]:
@@ -167,7 +167,8 @@ _choose = eqx.filter_jit(choose_half_width)
 
 @eqx.filter_jit
 def _slope(recording, signal, half_width, reach):
-    return local_quadratic(recording, signal, half_width * interval(recording), reach)[1]
+    # Half a sample more, so that the last sample to each side still counts.
+    return local_quadratic(recording, signal, (half_width + 0.5) * interval(recording), reach)[1]
 
 
 def derivative(

@@ -47,6 +47,7 @@ def identification(
     lines += ["", f"force error {document['force_error']:.2%}   result {document['result']}"]
     if document["result"] != "successful":
         lines += _wrapped(document["diagnosis"])
+    lines += _poor(document["force_error"])
     lines += _remarks(document["parameters"]) + _closing(document)
     return "\n".join(lines)
 
@@ -156,6 +157,16 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
         "Used whole, with its unequal end velocities, the record would be off in "
         + ", ".join(gains)
         + "."
+    )
+
+
+def _poor(force_error: float) -> list[str]:
+    """A warning where most of the force's power is something else than the model."""
+    if not force_error**2 > 0.5:
+        return []
+    return _wrapped(
+        f"The model leaves {force_error:.0%} of the force: more than half of its power is not friction "
+        "and inertia, so that these parameters describe this recording badly."
     )
 
 

@@ -14,7 +14,8 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 ORDER = """
     units recording terms signals models catalogue effects
     columns delimited cleaning tables io
-    small refine projections reduced compress uncertainty search identified identification selection online fleet
+    small refine projections reduced compress uncertainty search
+    identified identification selection online fleet
     control plant prediction simulation scenario
     explain concealed documents tabulate report export cli __main__
 """.split()
