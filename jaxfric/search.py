@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import compress, reduced
+from . import compress, reduced, small
 from .projections import Rows
 from .recording import Recording
 from .terms.base import AbstractTerm, Directional, Sum, summands
