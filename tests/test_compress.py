@@ -118,7 +118,8 @@ def test_samples_without_weight_do_not_matter():
     np.testing.assert_allclose(
         compress.compress(jnp.asarray(speed), values, panels),
         compress.compress(more, padded, panels),
-        rtol=1e-12, atol=1e-12,
+        rtol=1e-12,
+        atol=1e-12,
     )
 
 
