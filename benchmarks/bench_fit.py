@@ -7,8 +7,10 @@ import pytest
 
 SIZES = [2000] if peers.SHORT else [2000, 100_000]
 RIVALS = [
-    peers.scipy_one_start, peers.numpy_variable_projection,
-    peers.lmfit_five_starts, peers.scipy_five_starts,
+    peers.scipy_one_start,
+    peers.numpy_variable_projection,
+    peers.lmfit_five_starts,
+    peers.scipy_five_starts,
 ]
 
 

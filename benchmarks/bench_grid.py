@@ -47,7 +47,9 @@ def test_moments(benchmark, side):
             seconds[j, i] = time.process_time() - start
     ratio = float(np.median(seconds[1]) / np.median(seconds[0]))
     benchmark.extra_info |= {
-        "temporaries_MB": memory / 1e6, "L_against_naive": error, "cpu_over_floor": ratio
+        "temporaries_MB": memory / 1e6,
+        "L_against_naive": error,
+        "cpu_over_floor": ratio,
     }
     benchmark(call)
     assert memory < 10e6

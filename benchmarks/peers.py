@@ -167,8 +167,10 @@ def numpy_variable_projection(sides, points=100):
         pieces = np.array_split(grid, max(1, points * len(speed) // 10**6))
         i = int(np.clip(np.argmin(np.concatenate([costs(p) for p in pieces])), 1, points - 2))
         found = scipy.optimize.minimize_scalar(
-            lambda beta: costs(np.array([beta]))[0], bounds=(grid[i - 1], grid[i + 1]),
-            method="bounded", options={"xatol": 1e-10},
+            lambda beta: costs(np.array([beta]))[0],
+            bounds=(grid[i - 1], grid[i + 1]),
+            method="bounded",
+            options={"xatol": 1e-10},
         )
         return found.fun, found.x
 

@@ -165,8 +165,8 @@ def _poor(force_error: float) -> list[str]:
     if not force_error**2 > 0.5:
         return []
     return _wrapped(
-        f"The model leaves {force_error:.0%} of the force: more than half of its power is not friction "
-        "and inertia, so that these parameters describe this recording badly."
+        f"The model leaves {force_error:.0%} of the force: more than half of its power is neither "
+        "friction nor inertia, so that these parameters describe this recording badly."
     )
 
 
