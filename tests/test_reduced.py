@@ -244,7 +244,7 @@ def test_never_worse_than_the_grid_on_noise_alone():
             assert costs[-1] <= costs[:-1].min() * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("name", ["gaussian", "generalised"])
+@pytest.mark.parametrize("name", ["gaussian", pytest.param("generalised", marks=pytest.mark.slow)])
 def test_single_precision_is_sane(name):
     rng = np.random.default_rng(5)
     time = np.arange(4001) / 1000
