@@ -94,7 +94,9 @@ def test_the_derivative_is_the_stated_convolution():
 
 # Stein's estimate compares with the central difference, whose noise drowns the differences between
 # wide kernels: 1.7 to 17 times the best error was seen.
-TOO_NARROW = pytest.mark.xfail(reason="choose_half_width is too narrow where noise is high")
+TOO_NARROW = pytest.mark.xfail(
+    reason="choose_half_width is too narrow where noise is high", strict=False
+)
 
 
 @pytest.mark.parametrize(
