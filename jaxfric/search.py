@@ -119,7 +119,10 @@ def _(primals, tangents):
     free = (unit > 0) & (unit < 1) & (jnp.diagonal(hessian) > 0)
     free = free.astype(unit.dtype)
     hessian = hessian * (free[:, None] * free[None, :]) + jnp.diag(1 - free)
-    return unit, -small.solve_positive(hessian, change * free)[0]
+    # The inverse first: the rule must be linear in the tangent by its structure.
+    identity = jnp.eye(unit.shape[0], dtype=unit.dtype)
+    inverse = jax.vmap(lambda e: small.solve_positive(hessian, e)[0])(identity)
+    return unit, -inverse @ (change * free)
 
 
 def _grid_whole(problem: _Problem, points):
