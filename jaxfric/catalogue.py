@@ -27,6 +27,8 @@ class Effect(NamedTuple):
     - `needs`: signals beside time, velocity and force that a recording must have.
     - `first_order`: whether its terms are but the first order of the effect.
     - `separate_by`: the experiment that tells it from the confusable ones.
+    - `positive`: whether its affine parameters are magnitudes, so that a fit with another sign is
+      something else (friction dissipates, a delay is late, a stop pushes back).
     """
 
     name: str
@@ -37,6 +39,7 @@ class Effect(NamedTuple):
     needs: frozenset[str] = frozenset()
     first_order: bool = False
     separate_by: str = ""
+    positive: bool = False
 
 
 def _fixed(*terms: AbstractTerm) -> Callable[[Scales], tuple[AbstractTerm, ...]]:
@@ -100,6 +103,7 @@ CATALOGUE = (
             )
         ),
         separate_by="Hold several constant slow speeds: a Stribeck curve stays, a transient goes.",
+        positive=True,
     ),
     Effect(
         "viscous_nonlinearity",
@@ -153,6 +157,7 @@ CATALOGUE = (
         _fixed(laws.EndStop(), laws.LowerEndStop()),
         _POSITION,
         separate_by="Turn the motion round shortly before the suspected stop.",
+        positive=True,
     ),
     Effect(
         "position_dependent_friction",
@@ -171,6 +176,7 @@ CATALOGUE = (
         _fixed(laws.StickySpot()),
         _POSITION,
         separate_by="Cross the place slowly, both ways, several times.",
+        positive=True,
     ),
     Effect(
         "position_dependent_inertia",
@@ -189,6 +195,7 @@ CATALOGUE = (
         _fixed(laws.LoadDependentFriction()),
         _FORCE,
         separate_by="Record the load, or repeat with another payload.",
+        positive=True,
     ),
     Effect(
         "presliding",
@@ -197,6 +204,7 @@ CATALOGUE = (
         ("backlash", "frictional_lag", "stribeck"),
         _fixed(laws.Dahl()),
         separate_by="Reverse slowly over a few micrometres: presliding is elastic before it slips.",
+        positive=True,
     ),
     Effect(
         "frictional_lag",
@@ -207,6 +215,7 @@ CATALOGUE = (
         frozenset({"predicted_friction"}),
         True,
         "Cycle at low speed without a reversal: the loop in force over speed remains.",
+        positive=True,
     ),
     Effect(
         "backlash",
@@ -217,6 +226,7 @@ CATALOGUE = (
         _POSITION,
         True,
         _SLOWER,
+        positive=True,
     ),
     Effect(
         "compliance",
@@ -227,6 +237,7 @@ CATALOGUE = (
         frozenset({"predicted_jerk"}),
         True,
         "Excite with a sweep up to the resonance, or measure on the load side.",
+        positive=True,
     ),
     Effect(
         "transport_delay",
@@ -237,6 +248,7 @@ CATALOGUE = (
         _FORCE,
         True,
         "Excite faster: a delay turns the phase without bound, a lag by a quarter turn.",
+        positive=True,
     ),
     Effect(
         "actuator_lag",
@@ -247,6 +259,7 @@ CATALOGUE = (
         _FORCE,
         False,
         "Excite faster: a delay turns the phase without bound, a lag by a quarter turn.",
+        positive=True,
     ),
     Effect(
         "actuator_deadband",
@@ -256,6 +269,7 @@ CATALOGUE = (
         _fixed(laws.ActuatorDeadband()),
         _FORCE,
         separate_by="Decelerate hard, so that force and velocity have opposite signs.",
+        positive=True,
     ),
     Effect(
         "actuator_saturation",
@@ -265,6 +279,7 @@ CATALOGUE = (
         _fixed(laws.ActuatorSaturation()),
         _FORCE,
         separate_by="Repeat at half the acceleration, below the knee.",
+        positive=True,
     ),
     Effect(
         "gain_asymmetry",

@@ -1,0 +1,199 @@
+"""The terms that compete for a residual, with the places of their nonlinear parameters to try."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import terms as laws
+from ..catalogue import CATALOGUE, Effect
+from ..terms.base import AbstractTerm, Directional, summands
+from .evidence import Evidence
+from .regression import Space
+
+# Points of a grid over one nonlinear parameter, where nothing finer is needed below.
+GRID = 24
+# Four frequencies a resolution cell (one over the range): the peak then lies within an eighth of a
+# cell of one of them, where the loss is under 3 % of its power.
+OVERSAMPLING = 4
+# Bounds the cost on very long records: 512 periods in the range.
+MOST_LINES = 2048
+# Effects that time alone drives: another recording need not show them.
+OF_THE_MOMENT = frozenset(
+    {"friction_step", "load_drift", "disturbance_pulses", "thermal_drift", "periodic_disturbance"}
+)
+
+
+class Candidate(NamedTuple):
+    """A term of an effect, and the places of β to try: `betas`, `(G, d)`."""
+
+    effect: Effect
+    term: AbstractTerm
+    betas: np.ndarray
+    lines: "Lines | None" = None
+
+    def columns(self, evidence: Evidence) -> np.ndarray:
+        """The rows of its columns at every place, `(G, J, k)`."""
+        if self.lines is not None:
+            return self.lines.columns(evidence, self.betas[:, 0])
+        return evidence.columns(self.term, self.betas)
+
+
+class Lines(NamedTuple):
+    """Waves over a coordinate at the rows, without the nodes: sine and cosine, damped.
+
+    Over a kernel the coordinate is taken as a straight line; averaging then multiplies a wave by
+    the kernel's Fourier transform at 2πf·rate·reach. `coordinate`: "position" or "time";
+    `inverse`: whether the parameter is a period; `sided`: times the direction; `harmonics`.
+    """
+
+    coordinate: str
+    inverse: bool
+    sided: bool = False
+    harmonics: int = 1
+
+    def columns(self, evidence: Evidence, parameters: np.ndarray) -> np.ndarray:
+        """Columns at each frequency or period, `(G, J, 2 harmonics)`."""
+        frequency = 1 / parameters if self.inverse else parameters
+        value = np.asarray(getattr(evidence.motion, self.coordinate))[evidence.centre]
+        rate = np.asarray(evidence.motion.velocity)[evidence.centre]
+        rate = rate if self.coordinate == "position" else np.ones_like(rate)
+        frequency = frequency[:, None]
+        parts = []
+        for n in range(1, self.harmonics + 1):
+            turns = n * frequency * (value - value.mean())[None, :]
+            # Whole turns go first, so that single precision is enough for sine and cosine.
+            angle = (2 * np.pi * (turns - np.round(turns))).astype(np.float32)
+            swept = np.abs(2 * np.pi * n * frequency * (rate * evidence.reach)[None, :])
+            gain = _GAINS[np.minimum(swept * 20 + 0.5, len(_GAINS) - 1).astype(np.int32)]
+            gain = gain * evidence.side[None, :].astype(np.float32) if self.sided else gain
+            parts += [gain * np.sin(angle), gain * np.cos(angle)]
+        return np.stack(parts, axis=2)
+
+
+def _transform():
+    """∫ φ(τ) cos(zτ) dτ / ∫ φ dτ of the kernel φ = (1 − τ²)⁴, for z up to 30 (below 1e-4 there)."""
+    tau = np.linspace(-1.0, 1.0, 1001)
+    weight = (1 - tau**2) ** 4
+    turns = np.linspace(0.0, 30.0, 601)
+    gains = np.cos(turns[:, None] * tau[None, :]) @ weight / np.sum(weight)
+    gains[-1] = 0.0
+    return gains.astype(np.float32)
+
+
+# Tabulated in steps of 1/20, half of which shifts a gain by less than 0.006.
+_GAINS = _transform()
+
+
+class Field:
+    """The candidates for one recording, and their columns, kept from round to round."""
+
+    def __init__(self, evidence: Evidence, base: AbstractTerm):
+        self.candidates = candidates(evidence, base)
+        self._kept: dict[int, np.ndarray] = {}
+
+    def columns(self, number: int, evidence: Evidence) -> np.ndarray:
+        """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
+        candidate = self.candidates[number]
+        if any(name.startswith("predicted_") for name in candidate.term.coordinates):
+            return scaled(candidate.columns(evidence))
+        if number not in self._kept:
+            self._kept[number] = scaled(candidate.columns(evidence))
+        return self._kept[number]
+
+
+def scaled(raw: np.ndarray) -> np.ndarray:
+    """Columns `(G, J, k)` with largest value one, as a judge reads them: `(G, k, J)`, float32."""
+    size = np.max(np.abs(raw), axis=1, keepdims=True)
+    unit = (raw / np.where(size > 0, size, 1.0)).astype(np.float32)
+    return np.ascontiguousarray(unit.transpose(0, 2, 1))
+
+
+def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
+    """Every term of the catalogue that this recording has the signals for."""
+    limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
+    have = {"predicted_force", "predicted_friction", "predicted_jerk", *evidence.motion.channels}
+    if evidence.motion.position is not None:
+        have.add("position")
+    found = []
+    for effect in CATALOGUE:
+        if effect.needs - have or (effect.name in OF_THE_MOMENT and not evidence.clock):
+            continue
+        for term in effect.shapes(limits):
+            found += list(_with_places(effect, term, evidence))
+    present = {type(t) for t in _leaves(base)}
+    return [c for c in found if not (set(map(type, _leaves(c.term))) <= present)]
+
+
+def _leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
+    for part in summands(term):
+        if isinstance(part, Directional):
+            yield from _leaves(part.positive)
+        else:
+            yield part
+
+
+def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iterator[Candidate]:
+    kind = type(term)
+    if kind in (laws.Cogging, laws.PositionDependentFriction):
+        sided = kind is laws.PositionDependentFriction
+        harmonics = 1 if sided else term.harmonics
+        periods = 1 / line_frequencies(evidence, "position", harmonics)
+        if sided:
+            stroke = evidence.limits.high - evidence.limits.low
+            periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
+        yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))
+    elif kind is laws.PeriodicDisturbance:
+        tones = line_frequencies(evidence, "time", 1)
+        yield Candidate(effect, term, tones[:, None], Lines("time", False))
+    elif kind is laws.StickySpot:
+        yield Candidate(effect, term, _spots(evidence))
+    elif kind is laws.PositionDependentInertia:
+        stroke = evidence.limits.high - evidence.limits.low
+        periods = stroke / np.concatenate([2.0 ** np.arange(-3, 0, 0.5), np.arange(1, 8, 0.25)])
+        yield Candidate(effect, term, periods[:, None])
+    else:
+        yield Candidate(effect, term, _grid(term, evidence))
+
+
+def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
+    """Places over the compact set: all nonlinear parameters together along its diagonal."""
+    space = Space([term], evidence)
+    count = len(term.nonlinear)
+    if not count:
+        return np.zeros((1, 0))
+    fine = 2 * GRID if isinstance(term, laws.FrictionStep) else GRID
+    along = (np.arange(fine) + 0.5) / fine
+    return space.beta(np.repeat(along[:, None], count, axis=1))
+
+
+def _spots(evidence: Evidence) -> np.ndarray:
+    """Places one width apart, for widths by factors of 1.6 from what the kernel resolves."""
+    limits = evidence.limits
+    stroke = limits.high - limits.low
+    speed = np.median(np.abs(np.asarray(evidence.motion.velocity)[evidence.centre]))
+    widths = np.geomspace(
+        np.clip(0.5 * speed * evidence.reach, stroke / 100, stroke / 8), stroke / 4, 6
+    )
+    return np.array(
+        [(at, w) for w in widths for at in np.arange(limits.low + w / 2, limits.high, w)]
+    )
+
+
+def line_frequencies(evidence: Evidence, coordinate: str, harmonics: int) -> np.ndarray:
+    """Equally spaced frequencies that resolve every line of a coordinate.
+
+    From one period in the range (one and a half in time: fewer are a drift) to where a wave at
+    the slow quartile of the speed has half a period in the kernel: shorter ones are averaged away.
+    """
+    limits = evidence.limits
+    top = 0.5 / evidence.reach
+    if coordinate == "time":
+        span, low = limits.duration, 1.5 / limits.duration
+    else:
+        span = limits.high - limits.low
+        speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
+        low, top = 1.0 / span, top / np.quantile(speed, 0.25)
+    top = max(top / harmonics, 2 * low)
+    count = int(np.clip(np.ceil(OVERSAMPLING * span * (top - low)), 16, MOST_LINES))
+    return np.linspace(low, min(top, low + count / (OVERSAMPLING * span)), count)

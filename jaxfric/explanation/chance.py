@@ -1,0 +1,157 @@
+"""What blocks of a residual say about columns, and what they would say by chance.
+
+With orthonormal columns E, orthogonal to all that the model can do already, and blocks b of the
+residual r, the scores g_b = E_bᵀ r_b are all that is needed: R² = |Σ g_b|²/|r|², and a draw of
+signs s_b has |Σ s_b g_b|² in its place (wild block bootstrap: Wu 1986; Shao 2010). Looking in many
+places is paid for by the largest statistic of each draw (Westfall & Young 1993).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .regression import Fit
+
+# Independent signs: as many as the record's length allows, 2⁶⁴ patterns at most.
+BLOCKS = 64
+# A block is this many half-widths of the kernel long, so that neighbours hardly share noise.
+BLOCK_LENGTH = 8
+# Fewer blocks have fewer patterns of signs than a p-value of 1 % needs to rest on.
+FEWEST = 8
+DRAWS = 499
+# Candidates of which the model imitates all but this part, in amplitude, are not told from it: to
+# be seen at a tenth of the force they would have to be five times the force.
+NEW = 0.02
+# Columns that are judged together: they fill the cache and no more.
+CHUNK = 64
+
+
+class Scan(NamedTuple):
+    """How well each of many groups of columns explains a residual.
+
+    `gain`: R² of each, `(G,)`; `chance`: the mean R² by chance, `(G,)`; `drawn`: the highest R²
+    of each draw, `(D,)`; `dimension`: columns of each that are new, `(G,)`.
+    """
+
+    gain: np.ndarray
+    chance: np.ndarray
+    drawn: np.ndarray
+    dimension: np.ndarray
+
+    @property
+    def best(self) -> int:
+        """The group with the highest gain."""
+        return int(np.argmax(self.gain))
+
+
+class Judge:
+    """A residual, what the model spans, and the signs to flip it by; for one fit."""
+
+    def __init__(self, fit: Fit, block: np.ndarray, seed: int = 0):
+        basis = fit.basis()
+        residual = fit.residual - basis @ (basis.T @ fit.residual)
+        # Single precision is ample for ranking, and twice as fast; units cancel in the scale.
+        self.scale = float(np.sqrt(residual @ residual))
+        self.basis = basis.astype(np.float32)
+        self.residual = (residual / self.scale).astype(np.float32)
+        count = int(block[-1]) + 1
+        self.members = (block[:, None] == np.arange(count)[None, :]).astype(np.float32)
+        self.votes = self.members * self.residual[:, None]
+        signs = np.random.default_rng(seed).integers(0, 2, (DRAWS, count)) * 2.0 - 1.0
+        self.signs = signs.astype(np.float32)
+
+    def __call__(self, raw: np.ndarray, positive: bool = False) -> Scan:
+        """Judge groups of columns, `(G, k, J)`; `positive`: a single one only with that sign."""
+        size = max(1, CHUNK // raw.shape[1])
+        parts = [self._chunk(raw[i : i + size], positive) for i in range(0, len(raw), size)]
+        gain, chance, drawn, dimension = zip(*parts, strict=True)
+        return Scan(
+            np.concatenate(gain), np.concatenate(chance), np.max(drawn, axis=0),
+            np.concatenate(dimension),
+        )  # fmt: skip
+
+    def _chunk(self, raw, positive):
+        own, dimension = self.fresh(raw)
+        scores = own @ self.votes
+        fitted = scores.sum(axis=2)
+        noise = self._unexplained(own, scores, fitted)
+        g, k, b = noise.shape
+        drawn = (noise.reshape(g * k, b) @ self.signs.T).reshape(g, k, -1)
+        power = np.einsum("gkd,gkd->gd", drawn, drawn)
+        if positive and k == 1:
+            fitted = np.maximum(fitted, 0.0)
+        return np.sum(fitted**2, axis=1), power.mean(axis=1), power.max(axis=0), dimension
+
+    def _unexplained(self, own, scores, fitted):
+        """The scores of what the group itself leaves, each block freed of its own pull on the fit.
+
+        (I − H_b)⁻¹ (g_b − H_b a), as the delete-one-block jackknife has it (Bell & McCaffrey
+        2002); a block with half of the leverage has no others to be judged by and keeps g_b.
+        """
+        k = own.shape[1]
+        lever = np.zeros((len(own), scores.shape[2], k, k), own.dtype)
+        for i in range(k):
+            for j in range(i, k):
+                lever[..., i, j] = (own[:, i] * own[:, j]) @ self.members
+                lever[..., j, i] = lever[..., i, j]
+        left = scores.transpose(0, 2, 1) - np.einsum("gbij,gj->gbi", lever, fitted)
+        alone = np.trace(lever, axis1=2, axis2=3) > 0.5
+        safe = np.where(alone[..., None, None], 0.0, lever)
+        free = np.linalg.solve(np.eye(k, dtype=own.dtype) - safe, left[..., None])[..., 0]
+        return np.where(alone[:, None], scores, free.transpose(0, 2, 1))
+
+    def fresh(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Orthonormal columns of what each group adds, `(G, k, J)`, and how many, `(G,)`."""
+        size = np.sqrt(np.einsum("gkj,gkj->gk", raw, raw))
+        own = raw - (raw @ self.basis) @ self.basis.T
+        dimension = np.zeros(len(raw), int)
+        for i in range(raw.shape[1]):
+            for h in range(i):
+                own[:, i] -= own[:, h] * np.einsum("gj,gj->g", own[:, h], own[:, i])[:, None]
+            left = np.sqrt(np.einsum("gj,gj->g", own[:, i], own[:, i]))
+            new = left > NEW * size[:, i]
+            own[:, i] *= np.where(new, 1 / np.where(new, left, 1.0), 0.0)[:, None]
+            dimension += new
+        return own, dimension
+
+
+def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
+    """The block of each row: stretches with as many rows each; raises `ValueError` for too few.
+
+    **Arguments:** `elapsed`, s, of each row; `reach`, the kernel's half-width, s.
+    """
+    spacing = 0.5 * reach
+    count = int(min(BLOCKS, len(elapsed) * spacing / (BLOCK_LENGTH * reach)))
+    if count < FEWEST:
+        needed = FEWEST * BLOCK_LENGTH * reach
+        raise ValueError(
+            f"{len(elapsed) * spacing:.3g} s of slip are too short to tell structure from chance; "
+            f"with this noise that takes {needed:.3g} s. Record longer, or more finely."
+        )
+    return np.arange(len(elapsed)) * count // len(elapsed)
+
+
+def adjusted(gains: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """p-values of several statistics, paid for by the largest of each draw, `(C,)`.
+
+    Cube roots make sums of squares nearly normal (Wilson & Hilferty 1931); centred and scaled by
+    the draws, curves of any number of knots and the highest of any number of lines compare.
+
+    **Arguments:** `gains`, R² `(C,)`; `drawn`, of each draw `(C, D)`.
+    """
+    mean, spread, highest = _standard(drawn)
+    ours = (np.cbrt(gains) - mean) / np.where(spread > 0, spread, np.inf)
+    return (1 + np.sum(highest[None, :] >= ours[:, None], axis=1)) / (1 + drawn.shape[1])
+
+
+def thresholds(drawn: np.ndarray, level: float) -> np.ndarray:
+    """The R² of each statistic from which its adjusted p-value is below `level`, `(C,)`."""
+    mean, spread, highest = _standard(drawn)
+    return (mean + spread * np.quantile(highest, 1 - level)) ** 3
+
+
+def _standard(drawn):
+    rooted = np.cbrt(drawn)
+    mean, spread = rooted.mean(axis=1), rooted.std(axis=1)
+    scaled = (rooted - mean[:, None]) / np.where(spread > 0, spread, np.inf)[:, None]
+    return mean, spread, np.max(scaled, axis=0)

@@ -1,0 +1,228 @@
+"""A recording as rows of one regression on the host: small, compiled once, for many candidates.
+
+Explaining tries dozens of terms on one recording, each at dozens of parameter values. So the
+recording is first reduced to nodes, local means a sixth of the kernel apart, and every row of the
+weak form is a weighted sum of thirteen of them: the same linear functional for the force and for
+every column, at a cost that follows the record's bandwidth and not its sample rate.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .. import signals
+from ..recording import Recording
+from ..terms.base import AbstractTerm, Scales
+
+# Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
+# which is below 1e-4 of its peak.
+NODES = 6
+# Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
+STRIDE = 3
+# Values of the nonlinear parameters that one compiled call takes.
+BATCH = 8
+
+
+class Evidence(NamedTuple):
+    """Rows of the weak form in slip, and the motion at the nodes they are made of.
+
+    - `motion`: recording of the nodes, padded to one of few lengths, `(M,)`.
+    - `nodes`: how many of them are real.
+    - `index`: the nodes of each row, `(J, K)`; `average` and `slope`: their weights, 1 and 1/s.
+    - `target`: the force of each row, N, `(J,)`; `side`: its direction, ±1.
+    - `centre`: the node in the middle of each row, `(J,)`.
+    - `elapsed`: time since the start without interruptions, s, at the nodes, `(M,)`.
+    - `limits`: magnitudes of the recording; `reach`: the kernel's half-width, s; `width`: the same
+      in samples.
+    - `clock`: whether the time stamps increase throughout, so that time is a coordinate.
+    """
+
+    motion: Recording
+    nodes: int
+    index: np.ndarray
+    average: np.ndarray
+    slope: np.ndarray
+    target: np.ndarray
+    side: np.ndarray
+    centre: np.ndarray
+    elapsed: np.ndarray
+    limits: Scales
+    reach: float
+    width: int
+    clock: bool
+
+    def project(self, plain: Any, momentum: Any = None) -> np.ndarray:
+        """Values at the nodes, `(..., M, p)`, as rows, `(..., J, p)`; `momentum` differentiated."""
+        rows = _weigh(np.asarray(plain), self.index, self.average)
+        return rows if momentum is None else rows + _weigh(momentum, self.index, self.slope)
+
+    def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
+        """Rows of a term's columns at many β, `(G, d)` to `(G, J, p)`."""
+        if not len(term.affine):
+            return np.zeros((len(betas), len(self.target), 0))
+        parts = []
+        for start in range(0, len(betas), BATCH):
+            some = betas[start : start + BATCH]
+            full = np.concatenate([some, np.repeat(some[-1:], BATCH - len(some), axis=0)])
+            plain, momentum = _evaluate(term, jnp.asarray(full), self.motion)
+            momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
+            parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
+        return np.concatenate(parts)
+
+    def with_channels(self, **channels: np.ndarray) -> "Evidence":
+        """The same with more signals at the nodes, each `(M,)`."""
+        added = {name: jnp.asarray(value) for name, value in channels.items()}
+        motion = eqx.tree_at(lambda m: m.channels, self.motion, self.motion.channels | added)
+        return self._replace(motion=motion)
+
+
+def _weigh(values: np.ndarray, index: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    total = 0.0
+    for k in range(index.shape[1]):
+        total = total + weights[:, k, None] * values[..., index[:, k], :]
+    return np.asarray(total)
+
+
+@eqx.filter_jit
+def _evaluate(term, betas, motion):
+    """Columns, `(G, M, p)`, and momentum, `None` where there is none, at many β."""
+
+    def one(beta):
+        known = term.with_beta(beta)
+        return known.columns(motion), known.momentum(motion) if term.inertial else None
+
+    if term.nonlinear:
+        return jax.vmap(one)(betas)
+    alone = one(betas[0])
+    return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (BATCH, *x.shape)), alone)
+
+
+def gather(
+    recording: Recording,
+    half_width: int | None = None,
+    delay: float = 0.0,
+    reversals: bool = False,
+) -> Evidence:
+    """The evidence of one recording.
+
+    **Arguments:** `recording`, signals of shape `(N,)`; `half_width` of the kernel in samples, by
+    default [`kernel_half_width`][jaxfric.signals.kernel_half_width]; `delay`, s, by which the
+    force is taken later; `reversals`: rows that reach across a reversal too, but none at rest,
+    for judging a model as [`relative_error`][jaxfric.prediction.relative_error] does.
+
+    **Raises:** `ValueError` if the axis hardly slips.
+    """
+    prepared = signals.prepare(recording)
+    width = half_width or signals.kernel_half_width(prepared)
+    limits = Scales(*(float(x) for x in _scales(prepared)))
+    step = max(1, round(width / NODES))
+    reach = step * NODES * limits.interval
+    parts = _node_signals(prepared, limits, step, delay)
+    index, average, slope = _windows(parts, reach)
+    speed = parts["velocity"][index]
+    moving = np.abs(speed) > limits.slowest
+    one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
+    slips = np.sum(average * moving, axis=1) > 0.5 if reversals else moving.all(axis=1) & one_way
+    index, average, slope = index[slips], average[slips], slope[slips]
+    if len(index) < 32:
+        raise ValueError(
+            f"{recording.source or 'The recording'} leaves {len(index)} independent stretches in "
+            "which the axis slips; at least 32 are needed to tell structure from chance. Record "
+            "longer, or move more."
+        )
+    count = len(parts["time"])
+    motion = _padded(parts, prepared)
+    centre = index[:, NODES]
+    target = np.sum(average * parts["force"][index], axis=1)
+    elapsed = np.pad(parts["elapsed"], (0, motion.num_samples - count), mode="edge")
+    time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
+    return Evidence(
+        motion, count, index, average, slope, target, np.sign(parts["velocity"][centre]), centre,
+        elapsed, limits, reach, step * NODES, bool(np.all(np.diff(time) > 0)),
+    )  # fmt: skip
+
+
+_scales = eqx.filter_jit(signals.scales)
+
+
+def _node_signals(recording: Recording, limits: Scales, step: int, delay: float) -> dict:
+    """Local means of every signal, `step` samples apart, with the run that each node lies in."""
+    time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
+    linked = np.asarray(signals.continuous(recording, jnp.asarray(limits.interval)))
+    run = np.pad(np.cumsum(~linked), (1, 0))
+    steps = np.where(linked, np.diff(time), limits.interval)
+    series = {
+        "time": time,
+        "force": np.asarray(recording.force, float),
+        "velocity": np.asarray(recording.velocity, float),
+        "elapsed": np.pad(np.cumsum(steps), (1, 0)),
+    }
+    if recording.position is not None:
+        series["position"] = np.asarray(recording.position, float)
+    series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
+    if delay:
+        series["force"] = _shifted(time, series["force"], run, delay)
+    centres = np.arange(0, len(time), step)
+    offsets = np.arange(-(step - 1), step)
+    at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
+    near = mask[at] & (run[at] == run[centres][:, None])
+    near &= centres[:, None] + offsets[None, :] == at
+    weight = np.where(near, (step - np.abs(offsets))[None, :], 0.0)
+    total = weight.sum(axis=1)
+    weight /= np.where(total > 0, total, 1.0)[:, None]
+    means = {
+        name: np.einsum("ij,ij->i", weight, np.where(near, values[at], 0.0))
+        for name, values in series.items()
+    }
+    return means | {"run": np.where(total > 0, run[centres], -1 - np.arange(len(centres)))}
+
+
+def _shifted(time, force, run, delay):
+    """The force `delay` later, s: u(t + delay), inside each run."""
+    late = np.interp(time + delay, time, force) if np.all(np.diff(time) > 0) else None
+    if late is not None:
+        return late
+    out = np.empty_like(force)
+    for label in np.unique(run):
+        own = run == label
+        out[own] = np.interp(time[own] + delay, time[own], force[own])
+    return out
+
+
+def _windows(parts: dict, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes and weights of every row that lies within one run of the record."""
+    count = len(parts["time"])
+    middle = np.arange(NODES, count - NODES, STRIDE)
+    index = middle[:, None] + np.arange(-NODES, NODES + 1)[None, :]
+    whole = parts["run"][index[:, 0]] == parts["run"][index[:, -1]]
+    index = index[whole]
+    offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
+    tau = offset / reach
+    average = np.maximum(1 - tau**2, 0.0) ** 4
+    slope = 8 * tau * np.maximum(1 - tau**2, 0.0) ** 3
+    average /= average.sum(axis=1, keepdims=True)
+    slope -= average * slope.sum(axis=1, keepdims=True)
+    slope /= np.sum(slope * offset, axis=1, keepdims=True)
+    return index, average, slope
+
+
+def _padded(parts: dict, recording: Recording) -> Recording:
+    """The nodes as a recording, lengthened to the next of four lengths an octave."""
+    count = len(parts["time"])
+    power = 2.0 ** np.floor(np.log2(max(count, 64)))
+    length = int(next(m for m in power * np.array([1, 1.25, 1.5, 1.75, 2]) if m >= count))
+
+    def pad(values):
+        return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))
+
+    position = pad(parts["position"]) if "position" in parts else None
+    channels = {k[8:]: pad(v) for k, v in parts.items() if k.startswith("channel ")}
+    labels = np.unique(parts["run"], return_inverse=True)[1].astype(np.int32)
+    segment = jnp.asarray(np.pad(labels, (0, length - count), mode="edge"))
+    return Recording(
+        pad(parts["time"]), pad(parts["force"]), position, pad(parts["velocity"]),
+        segment=segment, channels=channels, num_segments=1, units=recording.units,
+    )  # fmt: skip

@@ -1,0 +1,159 @@
+"""Where a residual has structure: free curves over every coordinate, and lines.
+
+Along a coordinate c runs a free curve Σ_k F_k Λ_k(c) with hats Λ_k on knots, times a factor: one,
+the direction, or the velocity. For changing inertia the curve is M₁(x), its force that of
+Lagrange's equation; for a late force it is one constant times the rate of the predicted force.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .candidates import Lines, line_frequencies, scaled
+from .chance import Judge, Scan, adjusted, blocks
+from .evidence import Evidence
+from .regression import Fit
+
+# Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
+KNOTS = 12
+# Quantiles of the slip time at the knots: even, so that every cell holds as much of the record;
+# or doubling from 1/256, since what follows a reversal is over soon.
+_EVEN = np.linspace(0.0, 1.0, KNOTS)
+_EARLY = np.concatenate([[0.0], 2.0 ** np.linspace(-8.0, 0.0, KNOTS - 1)])
+
+
+class Place(NamedTuple):
+    """What the residual shows against one coordinate.
+
+    - `share`: part of the residual's mean square that the curve removes beyond what chance gives.
+    - `size`: root mean square of that, N; `p_value`, paid for by the number of coordinates.
+    - `peak`: the strongest line's frequency, 1/m or Hz; NaN for curves.
+    - `curve`: knots and force at them, N; empty for lines.
+    """
+
+    coordinate: str
+    share: float
+    size: float
+    p_value: float
+    peak: float
+    curve: tuple[np.ndarray, np.ndarray]
+
+
+def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
+    """Every coordinate, the largest share first; `evidence` with the fit's predictions."""
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    judge = Judge(now, block, seed)
+    names, raws, scans, peaks, knots = [], [], [], [], []
+    for name, (value, factor, kind) in coordinates(evidence).items():
+        places = _knots(value[evidence.centre], _EARLY if "since" in name else _EVEN)
+        raw = _hats(evidence, value, factor, kind, places)
+        names.append(name)
+        raws.append(raw)
+        knots.append(places)
+        scans.append(judge(scaled(raw[None])))
+        peaks.append(np.nan)
+    for name in ("position", "time"):
+        if name == "position" and evidence.motion.position is None:
+            continue
+        if name == "time" and not evidence.clock:
+            continue
+        grid = line_frequencies(evidence, name, 1)
+        scan = judge(scaled(Lines(name, False).columns(evidence, grid)))
+        names.append(f"{name}_lines")
+        raws.append(None)
+        knots.append(np.zeros(0))
+        scans.append(scan)
+        peaks.append(float(grid[scan.best]))
+    p_values = adjusted(np.array([s.gain.max() for s in scans]), np.array([s.drawn for s in scans]))
+    found = [
+        _place(name, raw, scan, float(p), peak, at, now)
+        for name, raw, scan, p, peak, at in zip(
+            names, raws, scans, p_values, peaks, knots, strict=True
+        )
+    ]
+    return sorted(found, key=lambda place: -place.share)
+
+
+def _place(name, raw, scan: Scan, p_value, peak, knots, now: Fit) -> Place:
+    share = max(float(scan.gain[scan.best] - scan.drawn.mean()), 0.0)
+    size = float(np.sqrt(share * now.energy / len(now.residual)))
+    curve = (knots, np.zeros_like(knots))
+    if raw is not None and len(knots):
+        basis = now.basis()
+        own = raw - basis @ (basis.T @ raw)
+        curve = (knots, np.linalg.lstsq(own, now.residual, rcond=1e-3)[0])
+    return Place(name, share, size, p_value, peak, curve)
+
+
+def coordinates(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:
+    """Value and factor at the nodes, and the kind of force, of each coordinate by name."""
+    motion = evidence.motion
+    v, seen = np.asarray(motion.velocity), motion.channels
+    one, side = np.ones_like(v), np.sign(v)
+    force = np.asarray(seen["predicted_force"])
+    since, distance = since_reversal(evidence)
+    found = {
+        "velocity": (v, one, "plain"),
+        "time_since_reversal": (since, side, "plain"),
+        "distance_since_reversal": (distance, side, "plain"),
+        "predicted_force": (force, one, "plain"),
+        "predicted_force_by_direction": (force, side, "plain"),
+        "force_rate": (force, one, "rate"),
+        "acceleration": (np.asarray(seen["predicted_acceleration"]), one, "plain"),
+    }
+    if evidence.clock:
+        t = np.asarray(motion.time)
+        found["time"] = (t, one, "plain")
+        found["time_by_direction"] = (t, side, "plain")
+        found["time_by_velocity"] = (t, v, "plain")
+    if motion.position is not None:
+        x = np.asarray(motion.position)
+        found["position"] = (x, one, "plain")
+        found["position_by_direction"] = (x, side, "plain")
+        found["position_by_acceleration"] = (x, v, "momentum")
+    for name in ("load", "temperature"):
+        if name in seen:
+            found[name] = (np.asarray(seen[name]), side, "plain")
+    if "neighbour_velocity" in seen:
+        other = np.asarray(seen["neighbour_velocity"])
+        found["neighbour"] = (other, one, "plain")
+    return found
+
+
+def since_reversal(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Time, s, and distance, m, since the velocity last changed its sign, at the nodes.
+
+    Before the first reversal of a segment both count from the segment's start.
+    """
+    velocity, time = np.asarray(evidence.motion.velocity), evidence.elapsed
+    segment = np.asarray(evidence.motion.segment)
+    turns = (velocity[1:] * velocity[:-1] <= 0) | (segment[1:] != segment[:-1])
+    last = np.maximum.accumulate(np.where(np.pad(turns, (1, 0)), np.arange(len(time)), 0))
+    speed = np.abs(velocity)
+    way = np.pad(np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)), (1, 0))
+    return time - time[last], way - way[last]
+
+
+def _knots(values: np.ndarray, levels: np.ndarray) -> np.ndarray:
+    places = np.quantile(values, levels)
+    width = places[-1] - places[0]
+    # Strictly increasing, by a millionth of the range, where many samples share one value.
+    return places + 1e-6 * (width if width > 0 else 1.0) * np.arange(len(places))
+
+
+def _hats(evidence, value, factor, kind, knots) -> np.ndarray:
+    """The curve's hats as rows, `(J, K)`."""
+    if kind == "rate":
+        return evidence.project(np.zeros((len(value), 1)), value[:, None])
+    place = np.interp(value, knots, np.arange(len(knots)))
+    hats = np.maximum(1 - np.abs(place[:, None] - np.arange(len(knots))[None, :]), 0.0)
+    if kind == "plain":
+        return evidence.project(factor[:, None] * hats)
+    # Lagrange: d(M₁ v)/dt − ½ M₁′ v².
+    cell = np.clip(np.floor(place).astype(int), 0, len(knots) - 2)
+    inside = (value > knots[0]) & (value < knots[-1])
+    rate = np.where(inside, 1 / np.diff(knots)[cell], 0.0)
+    slopes = np.zeros_like(hats)
+    rows = np.arange(len(value))
+    slopes[rows, cell], slopes[rows, cell + 1] = -rate, rate
+    return evidence.project(-0.5 * (factor**2)[:, None] * slopes, factor[:, None] * hats)

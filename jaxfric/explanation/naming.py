@@ -1,0 +1,171 @@
+"""Which physics the residual calls for: candidates compete, the winner joins, all are refitted."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..terms.base import AbstractTerm
+from .candidates import Candidate, Field
+from .chance import Judge, adjusted, blocks, thresholds
+from .evidence import Evidence
+from .predictions import with_predictions
+from .regression import Fit, fit
+
+# A term is believed if chance would do as well somewhere in one case of a hundred.
+LEVEL = 0.01
+# And if it accounts for this much of the mean-square residual: below it, the amplitude is under a
+# sixth of the residual's, where held forces, counts and smoothed velocities leave their own traces.
+LEAST_SHARE = 0.03
+LATER_SHARE = 0.05
+MOST_TERMS = 4
+# Candidates refined beyond the grid: refining gains little over neighbouring grid points.
+FINALISTS = 8
+
+
+class Trial(NamedTuple):
+    """A candidate with its place on the grid, and how it did there.
+
+    `gain`: R²; `chance`: the mean of it by chance; `dimension`: how many of its columns are new;
+    `threshold`: the R² that would have been believed; `fresh`: the part of the term's force, in
+    amplitude, that the model cannot imitate.
+    """
+
+    candidate: Candidate
+    beta: np.ndarray
+    gain: float
+    chance: float
+    dimension: int
+    p_value: float
+    threshold: float
+    fresh: float
+
+    def score(self, gain: float, size: float) -> float:
+        """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978)."""
+        price = self.dimension + len(self.beta)
+        return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
+
+
+class Contest(NamedTuple):
+    """One round: every candidate on the grid, and the finalists refitted with the whole model."""
+
+    trials: list[Trial]
+    finalists: list[tuple[float, Trial, Fit]]
+    size: float
+
+
+def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contest:
+    """Let every candidate compete for the residual of a fit; `evidence` with its predictions."""
+    seen = evidence
+    block = blocks(seen.elapsed[seen.centre], seen.reach)
+    judge = Judge(now, block, seed)
+    scans = [
+        judge(field.columns(i, seen), candidate.effect.positive)
+        for i, candidate in enumerate(field.candidates)
+    ]
+    drawn = np.array([s.drawn for s in scans])
+    p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
+    least = thresholds(drawn, LEVEL)
+    trials = [
+        _trial(judge, c, field.columns(i, seen), scan, float(p), float(limit))
+        for i, (c, scan, p, limit) in enumerate(
+            zip(field.candidates, scans, p_values, least, strict=True)
+        )
+    ]
+    trials = [t for t in trials if t.dimension]
+    size = float(np.median([t.dimension / t.chance for t in trials]))
+    trials.sort(key=lambda t: -t.score(t.gain, size))
+    return Contest(trials, _finals(seen, now, trials, size), size)
+
+
+def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
+    best = scan.best
+    own = raw[best : best + 1]
+    inside = np.einsum("gkj,glj->gkl", own, judge.fresh(own)[0])
+    fresh = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
+    return Trial(
+        candidate, candidate.betas[best], float(scan.gain[best]), float(scan.chance[best]),
+        int(scan.dimension[best]), p_value, limit, float(fresh),
+    )  # fmt: skip
+
+
+def _finals(seen, now, trials, size):
+    done, basis = [], now.basis()
+    for trial in trials[:FINALISTS]:
+        if trial.score(trial.gain, size) < 0.5 * trials[0].score(trials[0].gain, size) - RIVAL:
+            break
+        refined = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
+        if trial.candidate.effect.positive and np.any(refined.alphas[0] < 0):
+            continue
+        gain = 1 - refined.energy / now.energy
+        done.append((trial.score(gain, size), trial, refined))
+    return sorted(done, key=lambda item: -item[0])
+
+
+class Taken(NamedTuple):
+    """A term that was taken, with its rivals: what chance, share and score it had."""
+
+    trial: Trial
+    rivals: tuple[str, ...]
+    p_value: float
+
+
+class Named(NamedTuple):
+    """The terms that the residual calls for, on top of the base.
+
+    `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
+    contest for what remains.
+    """
+
+    base: Fit
+    last: Fit
+    taken: list[Taken]
+    left: Contest
+
+
+def search(evidence: Evidence, base: Fit, structure: AbstractTerm, seed: int = 0) -> Named:
+    """Add terms while they are believed; after each, drop those that have become idle."""
+    now, taken = base, []
+    evidence = with_predictions(evidence, now)
+    field = Field(evidence, structure)
+    while True:
+        round_ = contest(evidence, now, field, seed)
+        best = _believed(round_, now, first=not taken)
+        if best is None or len(taken) >= MOST_TERMS:
+            return Named(base, now, taken, round_)
+        score, trial, refined = best
+        close = [t.candidate.effect.name for s, t, _ in round_.finalists if s > score - RIVAL]
+        own = trial.candidate.effect.name
+        rivals = tuple(dict.fromkeys(name for name in close if name != own))
+        taken.append(Taken(trial, rivals, trial.p_value))
+        terms, betas = (*now.terms, *refined.terms), (*now.betas, *refined.betas)
+        now = fit(terms, evidence, betas)
+        evidence = with_predictions(evidence, now)
+        now = fit(terms, evidence, now.betas, 4)
+        now, taken = _pruned(evidence, now, taken, round_.size)
+
+
+# A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
+# 1995 call ten on twice this scale very strong).
+RIVAL = 5.0
+
+
+def _believed(round_: Contest, now: Fit, first: bool):
+    for score, trial, refined in round_.finalists:
+        share = 1 - refined.energy / now.energy
+        enough = share >= (LEAST_SHARE if first else LATER_SHARE)
+        if score > 0 and trial.p_value <= LEVEL and enough:
+            return score, trial, refined
+    return None
+
+
+def _pruned(evidence, now, taken, size):
+    """Without the earlier terms that the newest one has made idle."""
+    start = len(now.terms) - len(taken)
+    for place in reversed(range(start, len(now.terms) - 1)):
+        keep = [i for i in range(len(now.terms)) if i != place]
+        less = fit([now.terms[i] for i in keep], evidence, [now.betas[i] for i in keep], 6)
+        gain = 1 - now.energy / less.energy
+        if taken[place - start].trial.score(gain, size) <= 0 or gain < LEAST_SHARE:
+            now = less
+            taken = [t for i, t in enumerate(taken) if i != place - start]
+    return now, taken

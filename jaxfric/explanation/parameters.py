@@ -1,0 +1,69 @@
+"""Parameters of fitted terms with their standard errors, as people name them."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..effects import wave
+from ..models import Model
+from ..terms.base import AbstractTerm, Sum, summands
+from ..uncertainty import Estimate
+from ..units import spell
+from .intervals import covariance
+from .regression import Fit
+
+
+def whole(now: Fit) -> AbstractTerm:
+    """All the terms of a fit as one sum, their β in place."""
+    known = [
+        t.with_beta(jnp.asarray(b)) if len(b) else t
+        for t, b in zip(now.terms, now.betas, strict=True)
+    ]
+    return Sum(tuple(leaf for term in known for leaf in summands(term)))
+
+
+def model(now: Fit, units) -> Model:
+    """The fit as a model."""
+    return Model(whole(now), jnp.asarray(np.concatenate(now.alphas)), units)
+
+
+def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
+    """The parameters of each term of a fit, waves by amplitude and phase too."""
+    matrix = covariance(now, block)
+    freedom = max(int(block[-1]) + 1 - matrix.shape[0] // 2, 3)
+    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
+    result = []
+    for n, term in enumerate(now.terms):
+        places = [*range(affine[n], affine[n + 1]), *range(searched[n], searched[n + 1])]
+        values = [*now.alphas[n], *now.betas[n]]
+        named = {
+            p.name: Estimate(
+                jnp.asarray(value),
+                jnp.sqrt(jnp.asarray(matrix[place, place])),
+                spell(p.dimension, units),
+                freedom,
+            )
+            for p, value, place in zip((*term.affine, *term.nonlinear), values, places, strict=True)
+        }
+        result.append(named | _waves(term, values, matrix[np.ix_(places, places)], named, freedom))
+    return result
+
+
+def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
+    """Amplitude and phase of every pair of sine and cosine."""
+    found = {}
+    names = [p.name for p in term.affine]
+    for i, name in enumerate(names):
+        if not name.endswith("_sin"):
+            continue
+        harmonic = name.removesuffix("_sin").partition("_harmonic")[2]
+        suffix = f"_harmonic{harmonic}" if harmonic else ""
+        pair = wave(
+            jnp.asarray(values[i]),
+            jnp.asarray(values[i + 1]),
+            jnp.asarray(matrix[i : i + 2, i : i + 2]),
+        )
+        unit = named[name].unit
+        found[f"amplitude{suffix}"] = Estimate(pair.amplitude, pair.amplitude_error, unit, freedom)
+        found[f"phase{suffix}"] = Estimate(pair.phase, pair.phase_error, "rad", freedom)
+    return found

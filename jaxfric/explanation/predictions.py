@@ -1,0 +1,52 @@
+"""Signals that a fit predicts from the motion: what faults of actuator and friction act on."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from .evidence import BATCH, NODES, Evidence, _evaluate
+from .regression import Fit
+
+
+def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
+    """The evidence with the channels that some terms read, at the nodes.
+
+    `predicted_force` û, N (the measured force in its place would explain itself);
+    `predicted_friction`, the part of it that is no acceleration, N; `predicted_acceleration`,
+    m/s²; `predicted_jerk`, m/s³.
+    """
+    count = evidence.motion.num_samples
+    friction, momentum = np.zeros(count), np.zeros(count)
+    for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
+        if any(name.startswith("predicted_") for name in term.coordinates):
+            continue  # a fault acts on what the motion needs, not on itself
+        plain, moving = _evaluate(
+            term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
+        )
+        friction = friction + np.asarray(plain[0]) @ alpha
+        if moving is not None:
+            momentum = momentum + np.asarray(moving[0]) @ alpha
+    acceleration = rate(evidence, np.asarray(evidence.motion.velocity))
+    return evidence.with_channels(
+        predicted_force=friction + rate(evidence, momentum),
+        predicted_friction=friction,
+        predicted_acceleration=acceleration,
+        predicted_jerk=rate(evidence, acceleration),
+    )
+
+
+def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
+    """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`."""
+    time = evidence.elapsed
+    spacing = evidence.reach / NODES
+    tau = np.arange(-NODES, NODES + 1) / NODES
+    weight = 8 * tau * (1 - tau**2) ** 3
+    weight = weight / np.sum(weight * tau * evidence.reach)
+    out = np.convolve(values, weight[::-1], "same")
+    # Where the kernel reaches across an interruption, or beyond the ends: the near difference.
+    segment = np.asarray(evidence.motion.segment)
+    before, after = np.roll(segment, NODES), np.roll(segment, -NODES)
+    whole = (before == segment) & (after == segment)
+    whole[:NODES] = whole[-NODES:] = False
+    near = np.gradient(values, spacing)
+    del time
+    return np.where(whole, out, near)

@@ -1,0 +1,249 @@
+"""Variable projection on the host: a sum of terms fitted to the rows of one recording.
+
+min over β of min over α of |y − G(β) α|², the affine α in closed form, β by Levenberg-Marquardt
+with Kaufman's Jacobian (Golub & Pereyra 1973; Kaufman 1975), inside the compact set. The same
+principle as [`jaxfric.identification`][], for the many short-lived sums that explaining tries:
+nothing is compiled but each term once.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..terms.base import AbstractTerm
+from .evidence import Evidence
+
+# A column of which less than this is left after the others is not told from them.
+RANK = 1e-8
+GRID = 24
+ITERATIONS = 20
+
+
+class Fit(NamedTuple):
+    """Terms with their parameters on some rows.
+
+    `betas`, one vector for each term; `alphas` likewise; `columns` `(J, p)`, `slopes` `(J, d)`,
+    the derivatives of the fitted force by β; `residual` `(J,)`, N; `energy`, its square sum.
+    """
+
+    terms: tuple[AbstractTerm, ...]
+    betas: tuple[np.ndarray, ...]
+    alphas: tuple[np.ndarray, ...]
+    columns: np.ndarray
+    slopes: np.ndarray
+    residual: np.ndarray
+    energy: float
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """Derivatives by all parameters, affine ones first, `(J, p + d)`."""
+        return np.concatenate([self.columns, self.slopes], axis=1)
+
+    def basis(self) -> np.ndarray:
+        """An orthonormal basis of the Jacobian's span, `(J, r)`."""
+        return orthonormal(self.jacobian)
+
+    def part(self, number: int) -> np.ndarray:
+        """The force of one of the terms, `(J,)`."""
+        counts = np.cumsum([0, *(len(a) for a in self.alphas)])
+        return self.columns[:, counts[number] : counts[number + 1]] @ self.alphas[number]
+
+
+def orthonormal(columns: np.ndarray, basis: np.ndarray | None = None) -> np.ndarray:
+    """Orthonormal columns that span what `columns` add to `basis`, `(J, r)`."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    columns = columns[:, size > 0] / size[size > 0]
+    if basis is not None and basis.shape[1]:
+        columns = columns - basis @ (basis.T @ columns)
+        columns = columns - basis @ (basis.T @ columns)
+    if not columns.shape[1]:
+        return columns
+    left, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, values > RANK]
+
+
+def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Least-squares coefficients, of least norm (in units of the columns) where not unique."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1.0)
+    return np.linalg.lstsq(columns / size, target, rcond=RANK)[0] / size
+
+
+class Beside:
+    """Evidence with the span of some columns taken out of target and columns alike."""
+
+    def __init__(self, evidence: Evidence, basis: np.ndarray):
+        self.basis, self.evidence, self.limits = basis, evidence, evidence.limits
+        self.target = evidence.target - basis @ (basis.T @ evidence.target)
+
+    def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
+        """Rows of a term's columns without that span."""
+        rows = self.evidence.columns(term, betas)
+        return rows - self.basis @ (self.basis.T @ rows)
+
+
+class Space:
+    """The compact set of the nonlinear parameters of some terms, in coordinates from 0 to 1."""
+
+    def __init__(self, terms: Sequence[AbstractTerm], evidence: Evidence):
+        limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
+        boxes = [_box(term, limits) for term in terms]
+        self.counts = [len(term.nonlinear) for term in terms]
+        parameters = [p for term in terms for p in term.nonlinear]
+        self.log = np.array([p.logarithmic for p in parameters], bool)
+        box = np.concatenate(boxes, axis=1)
+        self.low = np.where(self.log, np.log(np.where(self.log, box[0], 1.0)), box[0])
+        self.high = np.where(self.log, np.log(np.where(self.log, box[1], 1.0)), box[1])
+        self.high = np.maximum(self.high, self.low + 1e-9 * (1 + np.abs(self.low)))
+
+    def beta(self, place: np.ndarray) -> np.ndarray:
+        """Parameters at coordinates, `(..., d)`."""
+        raw = self.low + place * (self.high - self.low)
+        return np.where(self.log, np.exp(np.where(self.log, raw, 0.0)), raw)
+
+    def place(self, beta: np.ndarray) -> np.ndarray:
+        """Coordinates of parameters, moved inside the set."""
+        raw = np.where(self.log, np.log(np.where(self.log, beta, 1.0)), beta)
+        return np.clip((raw - self.low) / (self.high - self.low), 0.0, 1.0)
+
+    def split(self, beta: np.ndarray) -> list[np.ndarray]:
+        """The vector of all parameters as one vector for each term."""
+        ends = np.cumsum(self.counts)
+        return [beta[..., e - c : e] for e, c in zip(ends, self.counts, strict=True)]
+
+
+def _box(term, limits):
+    pairs = [tuple(float(x) for x in p.bounds(limits)) for p in term.nonlinear]
+    return np.array(pairs, float).reshape(-1, 2).T
+
+
+def fit(
+    terms: Sequence[AbstractTerm],
+    evidence: Evidence,
+    start: Sequence[np.ndarray | None] | None = None,
+    iterations: int = ITERATIONS,
+    beside: np.ndarray | None = None,
+) -> Fit:
+    """The sum of terms that fits the rows best.
+
+    **Arguments:** `terms`; `evidence`; `start`, β of each term to begin from (`None`: scanned);
+    `beside`, an orthonormal basis of further columns that are fitted along, `(J, r)`: then the
+    result's columns and residual are what those leave.
+    """
+    terms = tuple(terms)
+    evidence = evidence if beside is None else Beside(evidence, beside)
+    space = Space(terms, evidence)
+    if not sum(space.counts):
+        return _at(terms, evidence, space, np.zeros(0), derivatives=True)
+    place = np.full(sum(space.counts), 0.5)
+    known = list(start) if start is not None else [None] * len(terms)
+    unknown = [i for i, b in enumerate(known) if b is None]
+    filled = [
+        p if b is None else b for b, p in zip(known, space.split(space.beta(place)), strict=True)
+    ]
+    place = space.place(np.concatenate(filled))
+    if unknown:
+        place = _scan(terms, evidence, space, place, unknown)
+    return _refine(terms, evidence, space, place, iterations)
+
+
+def _at(terms, evidence, space, place, derivatives=False) -> Fit:
+    """The fit at given coordinates of β; with the derivatives by the coordinates' β."""
+    betas = space.split(space.beta(place))
+    step = 1e-4
+    columns, moved = [], []
+    for number, term in enumerate(terms):
+        grid, inner = [betas[number]], []
+        if derivatives:
+            offset = sum(space.counts[:number])
+            for i in range(space.counts[number]):
+                shifted = place.copy()
+                back = shifted[offset + i] + step > 1.0
+                shifted[offset + i] += -step if back else step
+                grid.append(space.split(space.beta(shifted))[number])
+                inner.append(grid[-1][i] - betas[number][i])
+        rows = evidence.columns(term, np.stack(grid))
+        columns.append(rows[0])
+        moved.append((rows[1:] - rows[:1], inner))
+    whole = np.concatenate(columns, axis=1)
+    alpha = solve(whole, evidence.target)
+    residual = evidence.target - whole @ alpha
+    ends = np.cumsum([0, *(c.shape[1] for c in columns)])
+    alphas = tuple(alpha[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True))
+    slopes = [
+        (difference @ alphas[n]) / size
+        for n, (differences, sizes) in enumerate(moved)
+        for difference, size in zip(differences, sizes, strict=True)
+    ]
+    jacobian = np.stack(slopes, axis=1) if slopes else np.zeros((len(residual), 0))
+    return Fit(terms, tuple(betas), alphas, whole, jacobian, residual, float(residual @ residual))
+
+
+def _scan(terms, evidence, space, place, unknown):
+    """Coordinates found one after the other, each by a grid with the others held, twice over."""
+    owner = np.repeat(np.arange(len(terms)), space.counts)
+    free = [i for i in range(len(place)) if owner[i] in unknown]
+    grid = (np.arange(GRID) + 0.5) / GRID
+    for _ in range(2 if len(free) > 1 else 1):
+        for i in free:
+            number = owner[i]
+            tried = np.repeat(place[None, :], GRID, axis=0)
+            tried[:, i] = grid
+            betas = space.split(space.beta(tried))[number]
+            others = [
+                evidence.columns(t, b[None])[0]
+                for n, (t, b) in enumerate(zip(terms, space.split(space.beta(place)), strict=True))
+                if n != number
+            ]
+            fixed = orthonormal(np.concatenate([*others, np.zeros((len(evidence.target), 0))], 1))
+            left = evidence.target - fixed @ (fixed.T @ evidence.target)
+            gains = [
+                np.sum((orthonormal(rows, fixed).T @ left) ** 2)
+                for rows in evidence.columns(terms[number], betas)
+            ]
+            place = place.copy()
+            place[i] = grid[int(np.argmax(gains))]
+    return place
+
+
+def _refine(terms, evidence, space, place, iterations):
+    """Levenberg-Marquardt with Kaufman's Jacobian, inside the set."""
+    damping, best = 1e-3, _at(terms, evidence, space, place, derivatives=True)
+    for _ in range(iterations):
+        basis = orthonormal(best.columns)
+        width = _rate(space, place)
+        slopes = best.slopes * width
+        slopes = slopes - basis @ (basis.T @ slopes)
+        gram, pull = slopes.T @ slopes, slopes.T @ best.residual
+        size = np.diag(gram).copy()
+        size[size <= 0] = 1.0
+        # A coordinate at its limit that is pulled outwards stays there.
+        stuck = ((place <= 0) & (pull < 0)) | ((place >= 1) & (pull > 0))
+        moving = ~stuck
+        if not moving.any():
+            break
+        for _ in range(6):
+            step = np.zeros_like(place)
+            matrix = gram[np.ix_(moving, moving)] + damping * np.diag(size[moving])
+            step[moving] = np.linalg.lstsq(matrix, pull[moving], rcond=None)[0]
+            # A fifth of the set at most: Gauss-Newton knows no more than the neighbourhood.
+            step *= min(1.0, 0.2 / max(np.max(np.abs(step)), 1e-300))
+            trial_place = np.clip(place + step, 0.0, 1.0)
+            trial = _at(terms, evidence, space, trial_place, derivatives=True)
+            if trial.energy < best.energy:
+                break
+            damping *= 8
+        else:
+            break
+        gained = best.energy - trial.energy
+        best, place, damping = trial, trial_place, max(damping / 8, 1e-9)
+        if gained < 1e-6 * best.energy:
+            break
+    return best
+
+
+def _rate(space, place):
+    """dβ/d(coordinate)."""
+    span = space.high - space.low
+    return np.where(space.log, space.beta(place) * span, span)

@@ -1,0 +1,64 @@
+"""What a found term is worth: alone, on a recording that it has not seen, and to how much."""
+
+import numpy as np
+
+from .evidence import Evidence
+from .naming import LEAST_SHARE, Contest, Named
+from .predictions import with_predictions
+from .regression import Fit, fit
+
+
+def residual(now: Fit, evidence: Evidence) -> np.ndarray:
+    """What a fit leaves of another recording with nothing refitted, N, `(J,)`."""
+    seen = with_predictions(evidence, now)
+    left = evidence.target.copy()
+    for term, beta, alpha in zip(now.terms, now.betas, now.alphas, strict=True):
+        left -= seen.columns(term, beta[None])[0] @ alpha
+    return left
+
+
+def error(now: Fit, evidence: Evidence) -> float:
+    """norm(force − predicted)/norm(force) over the rows, nothing refitted."""
+    left = residual(now, evidence)
+    return float(np.sqrt(left @ left / max(evidence.target @ evidence.target, 1e-300)))
+
+
+def without(named: Named, evidence: Evidence, number: int) -> Fit:
+    """The model refitted without the found term of that number."""
+    place = len(named.last.terms) - len(named.taken) + number
+    keep = [i for i in range(len(named.last.terms)) if i != place]
+    terms = [named.last.terms[i] for i in keep]
+    return fit(terms, evidence, [named.last.betas[i] for i in keep], 6)
+
+
+def share(less: Fit, more: Fit, base: Fit, evidence: Evidence) -> float:
+    """Part of the base's mean-square residual on a recording that `more` removes beyond `less`."""
+    energies = [float(np.sum(residual(f, evidence) ** 2)) for f in (less, more, base)]
+    return (energies[0] - energies[1]) / energies[2]
+
+
+def noise(now: Fit, reference: np.ndarray) -> float:
+    """The part of the force error that no model could remove, from neighbouring rows' differences.
+
+    Rows four apart share no samples; what differs between them is noise and what changes faster
+    than the kernel (von Neumann 1941).
+    """
+    differences = now.residual[4:] - now.residual[:-4]
+    level = np.median(np.abs(differences)) / 0.6745 / np.sqrt(2)
+    return float(level / np.sqrt(np.mean(reference**2)))
+
+
+def smallest_visible(contest: Contest, now: Fit) -> dict[str, float]:
+    """The smallest force, N rms in slip, of each effect that would have been named, by effect.
+
+    A term is named if its R² is over what chance gives at the highest of all draws and over
+    `LEAST_SHARE`; the least of an effect's shapes counts.
+    """
+    level = float(np.sqrt(now.energy / len(now.residual)))
+    found: dict[str, float] = {}
+    for trial in contest.trials:
+        least = max(LEAST_SHARE, trial.threshold)
+        size = level * np.sqrt(least) / max(trial.fresh, 1e-3)
+        name = trial.candidate.effect.name
+        found[name] = min(size, found.get(name, np.inf))
+    return found
