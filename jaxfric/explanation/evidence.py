@@ -6,6 +6,7 @@ weak form is a weighted sum of thirteen of them: the same linear functional for 
 every column, at a cost that follows the record's bandwidth and not its sample rate.
 """
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -67,7 +68,7 @@ class Evidence(NamedTuple):
         for start in range(0, len(betas), BATCH):
             some = betas[start : start + BATCH]
             full = np.concatenate([some, np.repeat(some[-1:], BATCH - len(some), axis=0)])
-            plain, momentum = _evaluate(term, jnp.asarray(full), self.motion)
+            plain, momentum = evaluate(term, jnp.asarray(full), self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
         return np.concatenate(parts)
@@ -86,10 +87,16 @@ def _weigh(values: np.ndarray, index: np.ndarray, weights: np.ndarray) -> np.nda
     return np.asarray(total)
 
 
-@eqx.filter_jit
-def _evaluate(term, betas, motion):
-    """Columns, `(G, M, p)`, and momentum, `None` where there is none, at many β."""
+def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
+    """Columns, `(BATCH, M, p)`, and momentum, `None` where there is none, at `BATCH` β.
 
+    Compiled once for each kind of term; but a term with numbers of the recording built into its
+    structure (the middle of the stroke, say) would be compiled for every recording anew.
+    """
+    return (_columns if _has_numbers(term) else _compiled)(term, betas, motion)
+
+
+def _columns(term, betas, motion):
     def one(beta):
         known = term.with_beta(beta)
         return known.columns(motion), known.momentum(motion) if term.inertial else None
@@ -98,6 +105,19 @@ def _evaluate(term, betas, motion):
         return jax.vmap(one)(betas)
     alone = one(betas[0])
     return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (BATCH, *x.shape)), alone)
+
+
+_compiled = eqx.filter_jit(_columns)
+
+
+def _has_numbers(term: Any) -> bool:
+    """Whether any static field, however deep, is a floating-point number or several."""
+    if isinstance(term, tuple):
+        return any(isinstance(part, float) or _has_numbers(part) for part in term)
+    if not isinstance(term, AbstractTerm):
+        return False
+    fields = [(f.metadata.get("static"), getattr(term, f.name)) for f in dataclasses.fields(term)]
+    return any((static and isinstance(v, float)) or _has_numbers(v) for static, v in fields)
 
 
 def gather(

@@ -24,9 +24,10 @@ from .sentences import sentence
 
 
 class _Question(NamedTuple):
-    """A recording with its base fit, its alignment, and the held-out recording."""
+    """A recording through a kernel and one of twice the width, its base fit, the held-out one."""
 
     evidence: Evidence
+    wide: Evidence | None
     held: Evidence | None
     base: Fit
     block: np.ndarray
@@ -49,7 +50,8 @@ def explain(
     """
     structure, name = _structure(baseline)
     asked = _question(recording, holdout, structure)
-    found = _verified(search(asked.evidence, asked.base, structure, seed), asked, structure, seed)
+    found = search(asked.evidence, asked.base, structure, asked.wide, seed)
+    found = _verified(found, asked, structure, seed)
     return _explained(recording, asked, found, name, seed)
 
 
@@ -66,14 +68,23 @@ def _structure(baseline) -> tuple[AbstractTerm, str]:
 def _question(recording, holdout, structure) -> _Question:
     motion = _from_position(recording)
     first = gather(motion)
-    delay = _alignment(first, structure)
-    evidence = gather(motion, delay=delay)
+    wide = _wider(motion, first.width)
+    delay = _alignment([first] if wide is None else [first, wide], structure)
+    evidence = gather(motion, first.width, delay)
+    wide = None if wide is None else gather(motion, wide.width, delay)
     held = None
     if holdout is not None:
         held = gather(_from_position(holdout), evidence.width, delay)
     base = fit([structure], evidence)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    return _Question(evidence, held, base, block, structure)
+    return _Question(evidence, wide, held, base, block, structure)
+
+
+def _wider(recording: Recording, width: int) -> Evidence | None:
+    try:
+        return gather(recording, 2 * width)
+    except ValueError:  # too few rows are left between the reversals
+        return None
 
 
 def _from_position(recording: Recording) -> Recording:
@@ -83,17 +94,21 @@ def _from_position(recording: Recording) -> Recording:
     return dataclasses.replace(recording, velocity=None)
 
 
-def _alignment(evidence: Evidence, structure: AbstractTerm) -> float:
+def _alignment(views: list[Evidence], structure: AbstractTerm) -> float:
     """How much later the force is to be taken, s, to belong to the same instant as the position.
 
     A force that is held from sample to sample acts half a sample late, a controller that needs the
     cycle for its computation one more: within a sample either way it is a matter of logging, which
-    nobody calls a fault. What is beyond is left to be found.
+    nobody calls a fault. What is beyond is left to be found. The wider kernel decides where the
+    two differ, since noise of the encoder moves the narrow one only.
     """
-    now = fit([structure], evidence)
-    seen = with_predictions(evidence, now)
-    with_delay = fit([structure, laws.TransportDelay()], seen, [now.betas[0], None])
-    delay, sample = float(with_delay.alphas[1][0]), evidence.limits.interval
+    sample, delays = views[0].limits.interval, []
+    for evidence in views:
+        now = fit([structure], evidence)
+        seen = with_predictions(evidence, now)
+        both = fit([structure, laws.TransportDelay()], seen, [now.betas[0], None])
+        delays.append(float(both.alphas[1][0]))
+    delay = delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
     return -delay if abs(delay) <= sample else -0.5 * sample
 
 

@@ -122,14 +122,24 @@ class Named(NamedTuple):
     left: Contest
 
 
-def search(evidence: Evidence, base: Fit, structure: AbstractTerm, seed: int = 0) -> Named:
-    """Add terms while they are believed; after each, drop those that have become idle."""
+def search(
+    evidence: Evidence,
+    base: Fit,
+    structure: AbstractTerm,
+    wide: Evidence | None = None,
+    seed: int = 0,
+) -> Named:
+    """Add terms while they are believed; after each, drop those that have become idle.
+
+    **Arguments:** `wide`: the recording through a kernel of twice the width, where terms that act
+    on derivatives of the force must show alike.
+    """
     now, taken = base, []
     evidence = with_predictions(evidence, now)
     field = Field(evidence, structure)
     while True:
         round_ = contest(evidence, now, field, seed)
-        best = _believed(round_, now, first=not taken)
+        best = _believed(round_, now, evidence, wide, first=not taken)
         if best is None or len(taken) >= MOST_TERMS:
             return Named(base, now, taken, round_)
         score, trial, refined = best
@@ -149,13 +159,42 @@ def search(evidence: Evidence, base: Fit, structure: AbstractTerm, seed: int = 0
 RIVAL = 5.0
 
 
-def _believed(round_: Contest, now: Fit, first: bool):
+# Effects whose columns hold a derivative of the acceleration: what the encoder's noise makes of
+# that is the same noise that the controller answered, so that it explains force without physics.
+SHARP = frozenset({"transport_delay", "actuator_lag", "compliance", "frictional_lag"})
+# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
+# force's root mean square, cannot be told from the sensor whatever its p-value.
+LINEARITY = 2e-3
+
+
+def _believed(round_: Contest, now: Fit, evidence, wide, first: bool):
+    least = LEAST_SHARE if first else LATER_SHARE
+    floor = LINEARITY**2 * float(evidence.target @ evidence.target)
     for score, trial, refined in round_.finalists:
-        share = 1 - refined.energy / now.energy
-        enough = share >= (LEAST_SHARE if first else LATER_SHARE)
-        if score > 0 and trial.p_value <= LEVEL and enough:
-            return score, trial, refined
+        gained = now.energy - refined.energy
+        enough = gained >= max(least * now.energy, floor)
+        if not (score > 0 and trial.p_value <= LEVEL and enough):
+            continue
+        if trial.candidate.effect.name in SHARP and not _confirmed(refined, now, wide, least):
+            continue
+        return score, trial, refined
     return None
+
+
+def _confirmed(refined: Fit, now: Fit, wide: Evidence | None, least: float) -> bool:
+    """Whether a term is the same through a kernel of twice the width.
+
+    There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly: a column of
+    noise changes its amplitude by more than half, a column of physics does not.
+    """
+    if wide is None:
+        return True
+    less = fit(now.terms, wide, now.betas, 4)
+    seen = with_predictions(wide, less)
+    more = fit([*now.terms, *refined.terms], seen, [*less.betas, *refined.betas], 6)
+    ratio = float(np.linalg.norm(more.alphas[-1]) / np.linalg.norm(refined.alphas[-1]))
+    positive = bool(np.all(more.alphas[-1] > 0))
+    return positive and 0.5 < ratio < 2 and less.energy - more.energy >= least * less.energy
 
 
 def _pruned(evidence, now, taken, size):

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from .evidence import BATCH, NODES, Evidence, _evaluate
+from .evidence import BATCH, NODES, Evidence, evaluate
 from .regression import Fit
 
 
@@ -19,7 +19,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if any(name.startswith("predicted_") for name in term.coordinates):
             continue  # a fault acts on what the motion needs, not on itself
-        plain, moving = _evaluate(
+        plain, moving = evaluate(
             term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
         )
         friction = friction + np.asarray(plain[0]) @ alpha
