@@ -1,6 +1,8 @@
 """What an explanation returns: the verdict, where, the findings, before and after, the model."""
 
 import dataclasses
+import math
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ..models import Model
@@ -14,6 +16,15 @@ VERDICTS = {
     "partly_explained": "Named physics accounts for a part; structure is left over.",
     "unexplained": "Something is missing that no effect of the library accounts for.",
 }
+
+
+class Moved(NamedTuple):
+    """A parameter of the baseline whose value is wrong: before, after, standard error, unit."""
+
+    before: float
+    value: Any
+    standard_error: Any
+    unit: str
 
 
 class Finding(NamedTuple):
@@ -33,7 +44,7 @@ class Finding(NamedTuple):
     sentence: str
     confusable_with: tuple[str, ...]
     separate_by: str
-    parameters: dict[str, Estimate]
+    parameters: Mapping[str, Estimate | Moved]
     share: float
     holdout_share: float | None
     p_value: float
@@ -100,12 +111,13 @@ class Explanation:
         return text
 
 
-def _estimates(parameters: dict[str, Estimate]) -> dict[str, Any]:
-    return {
-        name: {
-            "value": float(e.value),
-            "standard_error": float(e.standard_error),
-            "unit": e.unit,
-        }
-        for name, e in parameters.items()
-    }
+def _estimates(parameters: Mapping[str, Estimate | Moved]) -> dict[str, Any]:
+    return {name: _estimate(estimate) for name, estimate in parameters.items()}
+
+
+def _estimate(estimate: Estimate | Moved) -> dict[str, Any]:
+    error = float(estimate.standard_error)
+    rest = {"standard_error": error if math.isfinite(error) else None, "unit": estimate.unit}
+    if isinstance(estimate, Moved):
+        return {"from": float(estimate.before), "to": float(estimate.value), **rest}
+    return {"value": float(estimate.value), **rest}

@@ -45,11 +45,28 @@ class Trial(NamedTuple):
         return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
 
 
+class Finalist(NamedTuple):
+    """A candidate refined: its score and p-value, the energy left, and where.
+
+    `betas`: of the whole model, the candidate's last; `alpha`: the candidate's.
+    """
+
+    score: float
+    trial: Trial
+    p_value: float
+    energy: float
+    betas: tuple[np.ndarray, ...]
+    alpha: np.ndarray
+
+
 class Contest(NamedTuple):
-    """One round: every candidate on the grid, and the finalists refitted with the whole model."""
+    """One round: every candidate on the grid, and the finalists refitted with the whole model.
+
+    `size`: how many independent values the residual is worth.
+    """
 
     trials: list[Trial]
-    finalists: list[tuple[float, Trial, Fit]]
+    finalists: list[Finalist]
     size: float
 
 
@@ -88,25 +105,55 @@ def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
     )  # fmt: skip
 
 
-def _finals(seen, now, trials, size):
+def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
     done, basis = [], now.basis()
-    for trial in trials[:FINALISTS]:
-        if trial.score(trial.gain, size) < 0.5 * trials[0].score(trials[0].gain, size) - RIVAL:
-            break
-        refined = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
-        if trial.candidate.effect.positive and np.any(refined.alphas[0] < 0):
+    enough = 0.5 * trials[0].score(trials[0].gain, size) - RIVAL
+    for number, trial in enumerate(trials):
+        found = None
+        if number < FINALISTS and trial.score(trial.gain, size) >= enough:
+            found = _refined(seen, now, trial, basis)
+        if _imitated(trial, now):
+            again = _afresh(seen, now, trial)
+            found = again if found is None or again.energy < found.energy else found
+        if found is None or (trial.candidate.effect.positive and np.any(found.alpha < 0)):
             continue
-        gain = 1 - refined.energy / now.energy
-        done.append((trial.score(gain, size), trial, refined))
-    return sorted(done, key=lambda item: -item[0])
+        gain = 1 - found.energy / now.energy
+        p_value = LEVEL if gain > trial.threshold else 1.0
+        p_value = min(trial.p_value, p_value)
+        done.append(found._replace(score=trial.score(gain, size), p_value=p_value))
+    return sorted(done, key=lambda finalist: -finalist.score)
+
+
+def _refined(seen, now, trial, basis) -> Finalist:
+    """The candidate refined, the rest of the model fitted along to first order."""
+    found = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
+    betas = (*now.betas, found.betas[0])
+    return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
+
+
+def _imitated(trial: Trial, now: Fit) -> bool:
+    """Whether the base may have bent its own curve in velocity to what the candidate is."""
+    velocity = trial.candidate.term.coordinates <= {"velocity"} and len(trial.beta) < 2
+    return velocity and bool(now.terms[0].nonlinear)
+
+
+def _afresh(seen, now, trial) -> Finalist:
+    """The whole model with the candidate, the base's nonlinear parameters looked for anew."""
+    terms = (*now.terms, trial.candidate.term)
+    found = fit(terms, seen, [None, *now.betas[1:], trial.beta], 8)
+    return Finalist(0.0, trial, 1.0, found.energy, found.betas, found.alphas[-1])
 
 
 class Taken(NamedTuple):
-    """A term that was taken, with its rivals: what chance, share and score it had."""
+    """A term that was taken, its rivals, and its p-value.
+
+    `rephased`: whether on the held-out recording its waves only fit with another phase.
+    """
 
     trial: Trial
     rivals: tuple[str, ...]
     p_value: float
+    rephased: bool = False
 
 
 class Named(NamedTuple):
@@ -120,6 +167,12 @@ class Named(NamedTuple):
     last: Fit
     taken: list[Taken]
     left: Contest
+
+    @property
+    def rephased(self) -> frozenset[int]:
+        """Numbers of the terms that need another phase on the held-out recording."""
+        start = len(self.last.terms) - len(self.taken)
+        return frozenset(start + i for i, taken in enumerate(self.taken) if taken.rephased)
 
 
 def search(
@@ -142,13 +195,14 @@ def search(
         best = _believed(round_, now, evidence, wide, first=not taken)
         if best is None or len(taken) >= MOST_TERMS:
             return Named(base, now, taken, round_)
-        score, trial, refined = best
-        close = [t.candidate.effect.name for s, t, _ in round_.finalists if s > score - RIVAL]
-        own = trial.candidate.effect.name
+        own = best.trial.candidate.effect.name
+        close = [
+            f.trial.candidate.effect.name for f in round_.finalists if f.score > best.score - RIVAL
+        ]
         rivals = tuple(dict.fromkeys(name for name in close if name != own))
-        taken.append(Taken(trial, rivals, trial.p_value))
-        terms, betas = (*now.terms, *refined.terms), (*now.betas, *refined.betas)
-        now = fit(terms, evidence, betas)
+        taken.append(Taken(best.trial, rivals, best.p_value))
+        terms = (*now.terms, best.trial.candidate.term)
+        now = fit(terms, evidence, best.betas)
         evidence = with_predictions(evidence, now)
         now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
@@ -170,18 +224,19 @@ LINEARITY = 2e-3
 def _believed(round_: Contest, now: Fit, evidence, wide, first: bool):
     least = LEAST_SHARE if first else LATER_SHARE
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
-    for score, trial, refined in round_.finalists:
-        gained = now.energy - refined.energy
+    for finalist in round_.finalists:
+        gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
-        if not (score > 0 and trial.p_value <= LEVEL and enough):
+        if not (finalist.score > 0 and finalist.p_value <= LEVEL and enough):
             continue
-        if trial.candidate.effect.name in SHARP and not _confirmed(refined, now, wide, least):
+        sharp = finalist.trial.candidate.effect.name in SHARP
+        if sharp and not _confirmed(finalist, now, wide, least):
             continue
-        return score, trial, refined
+        return finalist
     return None
 
 
-def _confirmed(refined: Fit, now: Fit, wide: Evidence | None, least: float) -> bool:
+def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 
     There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly: a column of
@@ -189,10 +244,11 @@ def _confirmed(refined: Fit, now: Fit, wide: Evidence | None, least: float) -> b
     """
     if wide is None:
         return True
-    less = fit(now.terms, wide, now.betas, 4)
+    less = fit(now.terms, with_predictions(wide, now), now.betas, 4)
     seen = with_predictions(wide, less)
-    more = fit([*now.terms, *refined.terms], seen, [*less.betas, *refined.betas], 6)
-    ratio = float(np.linalg.norm(more.alphas[-1]) / np.linalg.norm(refined.alphas[-1]))
+    terms = (*now.terms, finalist.trial.candidate.term)
+    more = fit(terms, seen, (*less.betas, finalist.betas[-1]), 6)
+    ratio = float(np.linalg.norm(more.alphas[-1]) / np.linalg.norm(finalist.alpha))
     positive = bool(np.all(more.alphas[-1] > 0))
     return positive and 0.5 < ratio < 2 and less.energy - more.energy >= least * less.energy
 

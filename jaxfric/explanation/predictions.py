@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
+from ..terms.base import Sum
 from .evidence import BATCH, NODES, Evidence, evaluate
 from .regression import Fit
 
@@ -11,23 +12,26 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """The evidence with the channels that some terms read, at the nodes.
 
     `predicted_force` û, N (the measured force in its place would explain itself);
-    `predicted_friction`, the part of it that is no acceleration, N; `predicted_acceleration`,
+    `predicted_friction`, what of it depends on velocity alone, N; `predicted_acceleration`,
     m/s²; `predicted_jerk`, m/s³.
     """
     count = evidence.motion.num_samples
-    friction, momentum = np.zeros(count), np.zeros(count)
+    friction, other, momentum = np.zeros(count), np.zeros(count), np.zeros(count)
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if any(name.startswith("predicted_") for name in term.coordinates):
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
             term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
         )
-        friction = friction + np.asarray(plain[0]) @ alpha
+        if isinstance(term, Sum) or term.coordinates <= {"velocity"}:
+            friction = friction + np.asarray(plain[0]) @ alpha
+        else:
+            other = other + np.asarray(plain[0]) @ alpha
         if moving is not None:
             momentum = momentum + np.asarray(moving[0]) @ alpha
     acceleration = rate(evidence, np.asarray(evidence.motion.velocity))
     return evidence.with_channels(
-        predicted_force=friction + rate(evidence, momentum),
+        predicted_force=friction + other + rate(evidence, momentum),
         predicted_friction=friction,
         predicted_acceleration=acceleration,
         predicted_jerk=rate(evidence, acceleration),

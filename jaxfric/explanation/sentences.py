@@ -77,6 +77,15 @@ def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals)
     return text + "."
 
 
+def mismatch_sentence(moved, share: float) -> str:
+    """Wrong values of the baseline as a sentence."""
+    parts = [
+        f"{name} is {quantity(Estimate(m.value, m.standard_error, m.unit))}, not {m.before:.4g}"
+        for name, m in moved.items()
+    ]
+    return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
+
+
 class _Gaps(dict):
     def __missing__(self, key):
         return "an unknown amount"

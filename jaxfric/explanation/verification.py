@@ -8,18 +8,40 @@ from .predictions import with_predictions
 from .regression import Fit, fit
 
 
-def residual(now: Fit, evidence: Evidence) -> np.ndarray:
-    """What a fit leaves of another recording with nothing refitted, N, `(J,)`."""
+def residual(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> np.ndarray:
+    """What a fit leaves of another recording with nothing refitted, N, `(J,)`.
+
+    `rephased`: numbers of terms whose waves keep their amplitude but find their phase anew: the
+    zero of an incremental encoder is another after each homing.
+    """
     seen = with_predictions(evidence, now)
-    left = evidence.target.copy()
-    for term, beta, alpha in zip(now.terms, now.betas, now.alphas, strict=True):
-        left -= seen.columns(term, beta[None])[0] @ alpha
+    left, waves = evidence.target.copy(), []
+    for number, (term, beta, alpha) in enumerate(
+        zip(now.terms, now.betas, now.alphas, strict=True)
+    ):
+        columns = seen.columns(term, beta[None])[0]
+        if number in rephased:
+            waves.append((columns, alpha))
+        else:
+            left -= columns @ alpha
+    for columns, alpha in waves:
+        for i in range(0, len(alpha), 2):
+            free = np.linalg.lstsq(columns[:, i : i + 2], left, rcond=None)[0]
+            size = np.hypot(*alpha[i : i + 2]) / max(float(np.hypot(*free)), 1e-300)
+            left = left - columns[:, i : i + 2] @ (free * size)
     return left
 
 
-def error(now: Fit, evidence: Evidence) -> float:
+def wavelike(now: Fit, number: int) -> bool:
+    """Whether a term is a wave over position, whose phase belongs to the encoder's zero."""
+    term = now.terms[number]
+    paired = bool(term.affine) and all(p.name.endswith(("_sin", "_cos")) for p in term.affine)
+    return paired and "position" in term.coordinates
+
+
+def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
     """norm(force − predicted)/norm(force) over the rows, nothing refitted."""
-    left = residual(now, evidence)
+    left = residual(now, evidence, rephased)
     return float(np.sqrt(left @ left / max(evidence.target @ evidence.target, 1e-300)))
 
 
@@ -31,10 +53,18 @@ def without(named: Named, evidence: Evidence, number: int) -> Fit:
     return fit(terms, evidence, [named.last.betas[i] for i in keep], 6)
 
 
-def share(less: Fit, more: Fit, base: Fit, evidence: Evidence) -> float:
+def share(
+    less: Fit, more: Fit, base: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
+) -> float:
     """Part of the base's mean-square residual on a recording that `more` removes beyond `less`."""
-    energies = [float(np.sum(residual(f, evidence) ** 2)) for f in (less, more, base)]
-    return (energies[0] - energies[1]) / energies[2]
+    others = frozenset(
+        next(i for i, term in enumerate(less.terms) if term is more.terms[n])
+        for n in rephased
+        if any(term is more.terms[n] for term in less.terms)
+    )
+    ours = float(np.sum(residual(more, evidence, rephased) ** 2))
+    theirs = float(np.sum(residual(less, evidence, others) ** 2))
+    return (theirs - ours) / float(np.sum(residual(base, evidence) ** 2))
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:

@@ -1,0 +1,96 @@
+"""What is asked of a recording: its rows, aligned, and what the baseline leaves of them."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import terms as laws
+from ..recording import Recording
+from ..terms.base import AbstractTerm
+from .chance import blocks
+from .evidence import Evidence, gather
+from .predictions import with_predictions
+from .regression import Fit, fit
+
+# Alignments that differ by less than this part of a sample make no difference worth another search.
+ALIGNED = 0.1
+
+
+class Question(NamedTuple):
+    """A recording through a kernel and one of twice the width, its base fit, the held-out one.
+
+    `delay`: how much later the force was taken, s; `block`: of each row; `structure`: the baseline.
+    """
+
+    evidence: Evidence
+    wide: Evidence | None
+    held: Evidence | None
+    base: Fit
+    block: np.ndarray
+    structure: AbstractTerm
+    delay: float
+
+
+def ask(
+    recording: Recording,
+    holdout: Recording | None,
+    structure: AbstractTerm,
+    known: Fit | None = None,
+) -> Question:
+    """The rows of recording and held-out recording, force and motion aligned.
+
+    **Arguments:** `known`: the model to align by, by default the baseline.
+    """
+    motion = _from_position(recording)
+    first = gather(motion)
+    wide = _wider(motion, first.width)
+    delay = _alignment([first] if wide is None else [first, wide], structure, known)
+    evidence = gather(motion, first.width, delay)
+    wide = None if wide is None else gather(motion, wide.width, delay)
+    held = None
+    if holdout is not None:
+        held = gather(_from_position(holdout), evidence.width, delay)
+    base = fit([structure], evidence)
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    return Question(evidence, wide, held, base, block, structure, delay)
+
+
+def _wider(recording: Recording, width: int) -> Evidence | None:
+    try:
+        return gather(recording, 2 * width)
+    except ValueError:  # too few rows are left between the reversals
+        return None
+
+
+def _from_position(recording: Recording) -> Recording:
+    """A recorded velocity is late by its filter, which would look like a delay of the force."""
+    if recording.position is None:
+        return recording
+    return dataclasses.replace(recording, velocity=None)
+
+
+def _alignment(views: list[Evidence], structure: AbstractTerm, known: Fit | None) -> float:
+    """How much later the force is to be taken, s, to belong to the same instant as the position.
+
+    A force that is held from sample to sample acts half a sample late, a controller that needs the
+    cycle for its computation one more: within a sample either way it is a matter of logging, which
+    nobody calls a fault. What is beyond is left to be found. The wider kernel decides where the
+    two differ, since noise of the encoder moves the narrow one only.
+    """
+    sample, delays = views[0].limits.interval, []
+    terms, betas = [structure], None
+    if known is not None:
+        kept = [i for i, term in enumerate(known.terms) if type(term) not in _SHARP_TERMS]
+        terms, betas = [known.terms[i] for i in kept], [known.betas[i] for i in kept]
+    for evidence in views:
+        seen = evidence if known is None else with_predictions(evidence, known)
+        now = fit(terms, seen, betas)
+        seen = with_predictions(seen, now)
+        both = fit([*terms, laws.TransportDelay()], seen, [*now.betas, None])
+        delays.append(float(both.alphas[-1][0]))
+    delay = delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
+    return -delay if abs(delay) <= sample else -0.5 * sample
+
+
+_SHARP_TERMS = (laws.TransportDelay, laws.ActuatorLag, laws.Compliance, laws.FrictionalLag)

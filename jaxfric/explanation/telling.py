@@ -1,0 +1,172 @@
+"""What was found, told: findings with their parameters and sentences, the verdict, the errors."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..recording import Recording
+from . import parameters as spelled, verification
+from .baseline import Baseline, Mismatch, at_values
+from .candidates import OF_THE_MOMENT
+from .explained import Explanation, Finding, Moved
+from .locate import Place, locate
+from .naming import LATER_SHARE, LEAST_SHARE, LEVEL, LINEARITY, Named
+from .predictions import with_predictions
+from .question import Question
+from .regression import Fit
+from .sentences import mismatch_sentence, sentence
+
+
+def tell(
+    recording: Recording,
+    asked: Question,
+    found: Named,
+    known: Baseline,
+    wrong: Mismatch | None,
+    seed: int = 0,
+) -> Explanation:
+    """The explanation of a recording from all that was found about it."""
+    units, evidence = recording.unit_names, asked.evidence
+    first = found.base if wrong is None else at_values(known.model, evidence)
+    force = float(np.sqrt(np.mean(evidence.target**2)))
+    before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
+    after = []
+    if found.taken or wrong is not None:
+        seen = with_predictions(evidence, found.last)
+        after = _shown(locate(seen, found.last, seed), LATER_SHARE, force)
+    findings = _findings(found, asked, first, units)
+    values = spelled.estimates(found.base, asked.block, units)[0]
+    if wrong is not None:
+        findings = [_moved(values, wrong, found, first, asked), *findings]
+    return Explanation(
+        verdict=_verdict(bool(findings), before, after),
+        where=[_where(place, units) for place in before],
+        findings=sorted(findings, key=lambda finding: -finding.share),
+        fit=_errors(found, asked, first),
+        not_visible=_not_visible(found, units),
+        model=spelled.model(found.last, recording.units),
+        baseline=spelled.model(first, recording.units),
+        baseline_name=known.name,
+        baseline_parameters=values,
+        recording=_facts(recording),
+    )
+
+
+def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -> Finding:
+    names = [p.name for p in (*found.base.terms[0].affine, *found.base.terms[0].nonlinear)]
+    moved = {
+        names[i]: Moved(before, values[names[i]].value, *values[names[i]][1:3])
+        for i, before in wrong.moved.items()
+    }
+    held = None
+    if asked.held is not None:
+        held = verification.share(first, found.base, first, asked.held)
+    text = mismatch_sentence(moved, wrong.share)
+    equation = "θ = θ₀ + Δθ"
+    return Finding(
+        "parameter_mismatch", equation, text, (), "", moved, wrong.share, held, wrong.p_value
+    )
+
+
+def _shown(places: list[Place], least: float, force: float) -> list[Place]:
+    """The places that are believed: by chance, by share, and beyond the force's linearity."""
+    floor = LINEARITY * force
+    return [p for p in places if p.p_value <= LEVEL and p.share >= least and p.size >= floor]
+
+
+def _verdict(named: bool, before: list[Place], after: list[Place]) -> str:
+    if named:
+        return "partly_explained" if after else "explained"
+    return "unexplained" if before else "consistent"
+
+
+def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]:
+    seen = with_predictions(asked.evidence, found.last)
+    start = len(found.last.terms) - len(found.taken)
+    values = spelled.estimates(found.last, asked.block, units)[start:]
+    findings = []
+    for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
+        effect = taken.trial.candidate.effect
+        less = verification.without(found, seen, number)
+        share = (less.energy - found.last.energy) / first.energy
+        held = None
+        if asked.held is not None and effect.name not in OF_THE_MOMENT:
+            held = verification.share(less, found.last, first, asked.held, found.rephased)
+        rivals = taken.rivals
+        text = sentence(effect.name, parameters, share, rivals)
+        if taken.rephased:
+            text += (
+                " On the held-out recording it has the same period and amplitude at another "
+                "phase: the position's zero has moved, as after another homing."
+            )
+        findings.append(
+            Finding(
+                effect.name,
+                effect.equation,
+                text,
+                rivals,
+                effect.separate_by,
+                parameters,
+                float(share),
+                held,
+                taken.p_value,
+            )  # fmt: skip
+        )
+    return sorted(findings, key=lambda finding: -finding.share)
+
+
+def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
+    detail = ""
+    if place.coordinate == "position_lines":
+        detail = f"period {1 / place.peak:.4g} {units['position']}"
+    elif place.coordinate == "time_lines":
+        detail = f"{place.peak:.4g} Hz"
+    elif len(place.curve[0]):
+        at, height = place.curve
+        peak = int(np.argmax(np.abs(height)))
+        detail = f"strongest at {at[peak]:.3g}"
+    return {
+        "coordinate": place.coordinate.removesuffix("_lines"),
+        "share": place.share,
+        "size": place.size,
+        "p_value": place.p_value,
+        "detail": detail,
+    }
+
+
+def _errors(found: Named, asked: Question, first: Fit) -> dict[str, Any]:
+    def pair(evidence, rephased=frozenset()):
+        return {
+            "before": verification.error(first, evidence),
+            "after": verification.error(found.last, evidence, rephased),
+        }
+
+    return {
+        "force_error": pair(asked.evidence),
+        "holdout_force_error": None if asked.held is None else pair(asked.held, found.rephased),
+        "simulation_error": None,
+        "noise_floor": verification.noise(found.last, asked.evidence.target),
+    }
+
+
+def _not_visible(found: Named, units) -> list[dict[str, Any]]:
+    names = {taken.trial.candidate.effect.name for taken in found.taken}
+    sizes = verification.smallest_visible(found.left, found.last)
+    return [
+        {"effect": effect, "smallest_detectable": float(size), "unit": units["force"]}
+        for effect, size in sorted(sizes.items(), key=lambda item: item[1])
+        if effect not in names
+    ]
+
+
+def _facts(recording: Recording) -> dict[str, Any]:
+    time, mask = np.asarray(recording.time), np.asarray(recording.mask)
+    steps = np.diff(time[mask])
+    steps = steps[steps > 0]
+    return {
+        "file": recording.source,
+        "samples": int(mask.sum()),
+        "duration": float(steps.sum()),
+        "sample_rate": float(1 / np.median(steps)),
+    }
