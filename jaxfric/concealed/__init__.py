@@ -1,0 +1,5 @@
+"""Machines drawn at random with something concealed in them: for the demo, the tests, `prove`."""
+
+from .drawing import NAMES as NAMES, OUTSIDE as OUTSIDE, draw as draw
+from .machines import Machine as Machine, Noise as Noise, Plan as Plan
+from .runs import Run as Run, record as record

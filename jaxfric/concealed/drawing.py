@@ -1,0 +1,127 @@
+"""Drawing a machine, and what is concealed in it, from a seed."""
+
+import zlib
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.random import Generator
+
+from . import fields, memories, schedule
+from .machines import (
+    SHAPES,
+    Machine,
+    draw_friction,
+    draw_loop,
+    draw_noise,
+    draw_plan,
+    log_uniform,
+    reference,
+    tied,
+)
+from .nominal import Kind, nominal
+from .physics import ABSENT
+
+KINDS: Mapping[str, Kind] = {**fields.KINDS, **memories.KINDS, **schedule.KINDS}
+
+OUTSIDE = ("position_dependent_delay", "hysteretic_spring", "acceleration_dependent_friction")
+"""Effects that the library has no term for."""
+
+NAMES = tuple(name for name in KINDS if name not in OUTSIDE)
+"""Effects that the library knows, by the names of `jaxfric effects`."""
+
+# What the phase of the loop, or a large force of inertia, makes visible.
+_DYNAMIC = {
+    "transport_delay", "actuator_lag", "position_dependent_delay", "compliance",
+    "position_dependent_inertia", "load_dependent_friction", "actuator_saturation",
+    "gain_asymmetry", "acceleration_dependent_friction", "actuator_deadband",
+}  # fmt: skip
+_PHASE = {"transport_delay", "actuator_lag", "position_dependent_delay"}
+
+
+def draw(
+    seed: int, effects: Sequence[str] = (), size: float | tuple[float, float] = (0.02, 0.30)
+) -> Machine:
+    """A machine drawn at random, with the effects named concealed in it.
+
+    **Arguments:** `seed`, zero or more: the same seed is the same machine, whatever is concealed,
+    but for what an effect needs to be seen (a large inertia, a slow loop); `effects`, names out of
+    [`NAMES`][jaxfric.concealed.NAMES] or [`OUTSIDE`][jaxfric.concealed.OUTSIDE]; `size`, the root
+    mean square of an effect's force over the set-point's motion in parts of the Coulomb level:
+    one number, or the range of a log-uniform draw. What would not be physical any more is not
+    made, so that the size in `Machine.truth` can be smaller.
+
+    **Raises:** `ValueError` for an effect that there is none of, or one named twice.
+    """
+    effects = tuple(effects)
+    _check(effects)
+    rng = np.random.default_rng((seed, 0))
+    plan = draw_plan(rng)
+    time = np.arange(plan.count) / plan.sample_rate
+    x, v = reference(plan, seed, 0)
+    coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))
+    shape = _shape(rng, effects)
+    friction = draw_friction(rng, coulomb, top, shape)
+    if "asymmetric_friction" in effects:
+        friction = tied(friction)
+    if "frictional_lag" in effects:
+        friction = _pronounced(friction, coulomb, top)
+    mass = _mass(rng, v, time, coulomb, effects)
+    loop, noise = draw_loop(rng, mass, coulomb, plan, slowest=bool(_PHASE & set(effects)))
+    physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
+    physics["limit"] = 8 * coulomb + 3 * mass * float(
+        np.quantile(np.abs(np.gradient(v, time)), 0.999)
+    )
+    n = nominal(time, x, v, coulomb, physics, plan)
+    truth = {}
+    for name in effects:
+        truth[name] = _conceal(name, seed, n, size)
+        physics = {**physics, **KINDS[name].physics(truth[name], physics)}
+        n = n._replace(physics=physics)
+    baseline = shape if shape and "stribeck" not in effects else "coulomb-viscous"
+    if "asymmetric_friction" in effects:
+        baseline = f"symmetric-{baseline}"
+    blur = draw_noise(rng, coulomb, noise)
+    return Machine(seed, effects, baseline, coulomb, physics, plan, blur, truth)
+
+
+def _check(effects):
+    unknown = [name for name in effects if name not in KINDS]
+    if unknown:
+        raise ValueError(
+            f"No effect {', '.join(unknown)} can be concealed; there are {', '.join(KINDS)}."
+        )
+    if len(set(effects)) < len(effects):
+        raise ValueError(f"An effect is named twice: {', '.join(effects)}.")
+
+
+def _shape(rng: Generator, effects) -> str | None:
+    """The healthy machine's Stribeck curve, or `None`; one where friction's lag is to be seen."""
+    choice = (*SHAPES, None)[rng.integers(4)]
+    if "stribeck" in effects:
+        return None
+    if "frictional_lag" in effects and choice is None:
+        return SHAPES[0]
+    return choice
+
+
+def _pronounced(friction, coulomb, top):
+    """A high and wide bump: a narrow one is passed before its lag shows."""
+    wide = {f"bump{s}": max(friction[f"bump{s}"], 0.45 * coulomb) for s in "+-"}
+    wide |= {f"bump_speed{s}": max(friction[f"bump_speed{s}"], 0.1 * top) for s in "+-"}
+    return friction | wide
+
+
+def _mass(rng: Generator, v, time, coulomb, effects) -> float:
+    """The force of inertia (98 % of it) is 0.3 to 5 times Coulomb friction."""
+    ratio = log_uniform(rng, 0.3, 5.0)
+    if _DYNAMIC & set(effects):
+        ratio = max(ratio, 1.5 + 0.5 * ratio)
+    return ratio * coulomb / float(np.quantile(np.abs(np.gradient(v, time)), 0.98))
+
+
+def _conceal(name, seed, n, size):
+    rng = np.random.default_rng((seed, 1, zlib.crc32(name.encode())))
+    low, high = size if isinstance(size, tuple) else (size, size)
+    kind = KINDS[name]
+    truth = kind.draw(rng, n, log_uniform(rng, low, high))
+    return {**truth, "size": kind.measure(truth, n), "where": kind.where(truth)}

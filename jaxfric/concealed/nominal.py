@@ -1,0 +1,142 @@
+"""The motion that a machine is asked for, by which the sizes of concealed effects are set."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+
+from .machines import Plan
+
+Truth = dict[str, Any]
+
+
+class Nominal(NamedTuple):
+    """A motion and the force that the healthy machine needs for it.
+
+    `time` s, `x` m, `v`, `a`, `u` N, each `(N,)`; `way`: direction, 0 at rest; `dry`: the
+    Stribeck bump of each sample, N; `top` m/s, 98 % of the speeds are below it; `coulomb` N;
+    `physics` and `plan` of the machine.
+    """
+
+    time: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    u: np.ndarray
+    way: np.ndarray
+    top: float
+    coulomb: float
+    physics: Mapping[str, float]
+    plan: Plan
+
+    @property
+    def mass(self) -> float:
+        """The inertia of the healthy machine, kg."""
+        return self.physics["mass"]
+
+    @property
+    def substep(self) -> float:
+        """The simulator's step, s."""
+        return 1 / (self.plan.sample_rate * self.plan.substeps)
+
+    @property
+    def bandwidth(self) -> float:
+        """Of the position loop, rad/s."""
+        return float(np.sqrt(self.physics["kp"] / self.mass))
+
+
+class Kind(NamedTuple):
+    """One kind of concealed effect.
+
+    `draw(rng, nominal, size)`: its parameters; `force(truth, nominal)`: its force along a motion,
+    N, to first order where it is no force; `physics(truth, base)`: the simulator's parameters;
+    `where(truth)`: a sentence. With `centred`, the size counts the deviation of the force from its
+    mean only, since the baseline's constants take up the mean.
+    """
+
+    draw: Callable[[Generator, Nominal, float], Truth]
+    force: Callable[[Truth, Nominal], np.ndarray]
+    physics: Callable[[Truth, Mapping[str, float]], dict[str, float]]
+    where: Callable[[Truth], str]
+    centred: bool = False
+
+    def measure(self, truth: Truth, nominal: Nominal) -> float:
+        """The size: root mean square of the force in parts of the Coulomb level."""
+        force = self.force(truth, nominal)
+        return rms(force - np.mean(force) if self.centred else force) / nominal.coulomb
+
+
+def rms(x: np.ndarray) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(x))))
+
+
+def bump(physics: Mapping[str, float], speed: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """The Stribeck bump at speeds, m/s, in directions: its magnitude, N."""
+    ratio = speed / np.where(way > 0, physics["bump_speed+"], physics["bump_speed-"])
+    shape = (np.exp(-(ratio**2)), 1 / (1 + ratio**2), np.exp(-ratio))[int(physics["bump_shape"])]
+    return np.where(way > 0, physics["bump+"], physics["bump-"]) * shape
+
+
+def friction(physics: Mapping[str, float], v: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Friction of the healthy machine with its sign, and the constant force, N."""
+    coulomb = np.where(way > 0, physics["coulomb+"], physics["coulomb-"])
+    viscous = np.where(way > 0, physics["viscous+"], physics["viscous-"])
+    speed = np.abs(v)
+    return way * (coulomb + viscous * speed + bump(physics, speed, way)) + physics["offset"]
+
+
+def direction(v: np.ndarray, top: float) -> np.ndarray:
+    """Sign of the velocity, zero below a thousandth of the top speed (a dwell)."""
+    return np.sign(v) * (np.abs(v) > 1e-3 * top)
+
+
+def nominal(time, x, v, coulomb, physics, plan) -> Nominal:
+    """The set-point's motion with all that follows from it."""
+    top = float(np.quantile(np.abs(v), 0.98))
+    a, way = np.gradient(v, time), direction(v, top)
+    u = physics["mass"] * a + friction(physics, v, way)
+    return Nominal(time, x, v, a, u, way, top, coulomb, physics, plan)
+
+
+def scaled(kind: Kind, name: str, truth: Truth, n: Nominal, size: float, most=np.inf) -> Truth:
+    """The truth with the parameter `name`, to which the force is proportional, that makes `size`.
+
+    `most` limits the parameter: what would not be physical any more is not made.
+    """
+    unit = kind.measure({**truth, name: 1.0}, n)
+    return {**truth, name: float(min(size / unit, most)) if unit > 0 else 0.0}
+
+
+def solved(kind: Kind, name: str, truth: Truth, n: Nominal, size: float, bounds) -> Truth:
+    """The truth with the parameter `name`, with which the force grows, that makes `size`.
+
+    By bisection of its logarithm between the bounds; the nearer bound where neither reaches.
+    """
+    low, high = np.log(bounds[0]), np.log(max(bounds))
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        small = kind.measure({**truth, name: float(np.exp(middle))}, n) < size
+        low, high = (middle, high) if small else (low, middle)
+    return {**truth, name: float(np.exp(0.5 * (low + high)))}
+
+
+def reversals(n: Nominal) -> list[tuple[int, int]]:
+    """First sample and the one after the last of each stretch in one direction."""
+    way = np.where(n.way == 0, np.nan, n.way)
+    known = np.flatnonzero(~np.isnan(way))
+    turns = known[1:][way[known[1:]] != way[known[:-1]]]
+    edges = [0, *turns.tolist(), way.size]
+    return [(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True) if b > a]
+
+
+def travelled(n: Nominal) -> np.ndarray:
+    """Distance since the last reversal, m, `(N,)`; from the start far enough to be in slip."""
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(n.x)))])
+    since = np.empty_like(path)
+    for first, last in reversals(n):
+        since[first:last] = path[first:last] - path[first]
+    first = reversals(n)[0]
+    since[first[0] : first[1]] += n.plan.stroke
+    return since
