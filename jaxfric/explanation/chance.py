@@ -12,9 +12,11 @@ import numpy as np
 
 from .regression import Fit
 
-# Independent signs: as many as the record's length allows, 2⁶⁴ patterns at most.
-BLOCKS = 64
-# A block is this many half-widths of the kernel long, so that neighbours hardly share noise.
+# Few enough that what wanders slowly, as hidden loads do, stays within a block on most records:
+# shorter blocks take it for structure. Enough that the signs have 2²⁴ patterns.
+BLOCKS = 24
+# A block is this many half-widths of the kernel long, so that neighbours hardly share noise; on
+# short records half of that.
 BLOCK_LENGTH = 8
 # Fewer blocks have fewer patterns of signs than a p-value of 1 % needs to rest on.
 FEWEST = 8
@@ -121,9 +123,10 @@ def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
     **Arguments:** `elapsed`, s, of each row; `reach`, the kernel's half-width, s.
     """
     spacing = 0.5 * reach
-    count = int(min(BLOCKS, len(elapsed) * spacing / (BLOCK_LENGTH * reach)))
+    whole = len(elapsed) * spacing / (BLOCK_LENGTH * reach)
+    count = int(min(BLOCKS, max(whole, min(2 * whole, FEWEST))))
     if count < FEWEST:
-        needed = FEWEST * BLOCK_LENGTH * reach
+        needed = 0.5 * FEWEST * BLOCK_LENGTH * reach
         raise ValueError(
             f"{len(elapsed) * spacing:.3g} s of slip are too short to tell structure from chance; "
             f"with this noise that takes {needed:.3g} s. Record longer, or more finely."

@@ -45,7 +45,7 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
     judge = Judge(now, block, seed)
     names, raws, scans, peaks, knots = [], [], [], [], []
     for name, (value, factor, kind) in coordinates(evidence).items():
-        places = _knots(value[evidence.centre], _EARLY if "since" in name else _EVEN)
+        places = _knots(name, value[evidence.centre])
         raw = _hats(evidence, value, factor, kind, places)
         names.append(name)
         raws.append(raw)
@@ -134,8 +134,15 @@ def since_reversal(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     return time - time[last], way - way[last]
 
 
-def _knots(values: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    places = np.quantile(values, levels)
+# Coordinates with the encoder's noise in them, twice differentiated: where most samples share a
+# value, knots at its quantiles would resolve that noise, which is in the residual too.
+_NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direction"})
+
+
+def _knots(name: str, values: np.ndarray) -> np.ndarray:
+    places = np.quantile(values, _EARLY if "since" in name else _EVEN)
+    if name in _NOISY:
+        places = np.linspace(*np.quantile(values, [0.01, 0.99]), KNOTS)
     width = places[-1] - places[0]
     # Strictly increasing, by a millionth of the range, where many samples share one value.
     return places + 1e-6 * (width if width > 0 else 1.0) * np.arange(len(places))

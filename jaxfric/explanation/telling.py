@@ -9,12 +9,13 @@ from ..recording import Recording
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
+from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
 from .locate import Place, locate
 from .naming import LATER_SHARE, LEAST_SHARE, LEVEL, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
-from .regression import Fit
+from .regression import Fit, fit
 from .sentences import mismatch_sentence, sentence
 
 
@@ -31,10 +32,12 @@ def tell(
     first = found.base if wrong is None else at_values(known.model, evidence)
     force = float(np.sqrt(np.mean(evidence.target**2)))
     before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
+    before = _through_wide(before, first, asked.wide, seed)
     after = []
     if found.taken or wrong is not None:
         seen = with_predictions(evidence, found.last)
         after = _shown(locate(seen, found.last, seed), LATER_SHARE, force)
+        after = _through_wide(after, found.last, asked.wide, seed)
     findings = _findings(found, asked, first, units)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
@@ -73,6 +76,20 @@ def _shown(places: list[Place], least: float, force: float) -> list[Place]:
     """The places that are believed: by chance, by share, and beyond the force's linearity."""
     floor = LINEARITY * force
     return [p for p in places if p.p_value <= LEVEL and p.share >= least and p.size >= floor]
+
+
+def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) -> list[Place]:
+    """Without the force's rate, if a kernel of twice the width does not show it.
+
+    It holds the derivative of the acceleration, whose noise is in the residual too.
+    """
+    if wide is None or not any(place.coordinate == "force_rate" for place in places):
+        return places
+    again = fit(now.terms, with_predictions(wide, now), now.betas, 4)
+    there = {p.coordinate: p for p in locate(with_predictions(wide, again), again, seed)}
+    rate = there["force_rate"]
+    sure = rate.p_value <= LEVEL and rate.share >= LEAST_SHARE
+    return [place for place in places if sure or place.coordinate != "force_rate"]
 
 
 def _verdict(named: bool, before: list[Place], after: list[Place]) -> str:
