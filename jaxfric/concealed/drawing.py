@@ -1,15 +1,17 @@
 """Drawing a machine, and what is concealed in it, from a seed."""
 
+import dataclasses
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.random import Generator
 
-from . import fields, memories, schedule
+from .kinds import KINDS
 from .machines import (
     SHAPES,
     Machine,
+    draw_band,
     draw_friction,
     draw_loop,
     draw_noise,
@@ -18,16 +20,9 @@ from .machines import (
     reference,
     tied,
 )
-from .nominal import Kind, nominal
+from .nominal import nominal
 from .physics import ABSENT
-
-KINDS: Mapping[str, Kind] = {**fields.KINDS, **memories.KINDS, **schedule.KINDS}
-
-OUTSIDE = ("position_dependent_delay", "hysteretic_spring", "acceleration_dependent_friction")
-"""Effects that the library has no term for."""
-
-NAMES = tuple(name for name in KINDS if name not in OUTSIDE)
-"""Effects that the library knows, by the names of `jaxfric effects`."""
+from .tuning import tune
 
 # What the phase of the loop, or a large force of inertia, makes visible.
 _DYNAMIC = {
@@ -56,7 +51,7 @@ def draw(
     _check(effects)
     rng = np.random.default_rng((seed, 0))
     plan = draw_plan(rng)
-    time = np.arange(plan.count) / plan.sample_rate
+    time = np.arange(plan.samples) / plan.sample_rate
     x, v = reference(plan, seed, 0)
     coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))
     shape = _shape(rng, effects)
@@ -65,23 +60,31 @@ def draw(
         friction = tied(friction)
     if "frictional_lag" in effects:
         friction = _pronounced(friction, coulomb, top)
-    mass = _mass(rng, v, time, coulomb, effects)
-    loop, noise = draw_loop(rng, mass, coulomb, plan, slowest=bool(_PHASE & set(effects)))
+    omega = draw_band(rng, plan, slowest=bool(_PHASE & set(effects)))
+    # Coulomb friction may bend the loop by a twentieth of the stroke.
+    mass = max(_mass(rng, v, time, coulomb, effects), 20 * coulomb / (plan.stroke * omega**2))
+    loop, noise = draw_loop(rng, mass, coulomb, omega, plan)
     physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
-    physics["limit"] = 8 * coulomb + 3 * mass * float(
-        np.quantile(np.abs(np.gradient(v, time)), 0.999)
-    )
-    n = nominal(time, x, v, coulomb, physics, plan)
-    truth = {}
-    for name in effects:
-        truth[name] = _conceal(name, seed, n, size)
-        physics = {**physics, **KINDS[name].physics(truth[name], physics)}
-        n = n._replace(physics=physics)
+    # Far above what the motion needs: a limit that is met would be an effect of its own.
+    hardest = mass * float(np.quantile(np.abs(np.gradient(v, time)), 0.999))
+    physics["limit"] = 8 * coulomb + 3 * hardest
     baseline = shape if shape and "stribeck" not in effects else "coulomb-viscous"
     if "asymmetric_friction" in effects:
         baseline = f"symmetric-{baseline}"
     blur = draw_noise(rng, coulomb, noise)
-    return Machine(seed, effects, baseline, coulomb, physics, plan, blur, truth)
+    healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {})
+    return _with(healthy, effects, nominal(time, x, v, coulomb, physics, plan), size)
+
+
+def _with(machine: Machine, effects, n, size) -> Machine:
+    """The machine with effects, one after the other: each knows the friction of those before."""
+    for name in effects:
+        truth = _conceal(machine, name, n, size)
+        physics = {**machine.physics, **KINDS[name].physics(truth, machine.physics)}
+        both = (*machine.effects, name), {**machine.truth, name: truth}
+        machine = dataclasses.replace(machine, effects=both[0], physics=physics, truth=both[1])
+        n = n._replace(physics=physics)
+    return machine
 
 
 def _check(effects):
@@ -119,9 +122,11 @@ def _mass(rng: Generator, v, time, coulomb, effects) -> float:
     return ratio * coulomb / float(np.quantile(np.abs(np.gradient(v, time)), 0.98))
 
 
-def _conceal(name, seed, n, size):
-    rng = np.random.default_rng((seed, 1, zlib.crc32(name.encode())))
+def _conceal(machine, name, n, size):
+    rng = np.random.default_rng((machine.seed, 1, zlib.crc32(name.encode())))
     low, high = size if isinstance(size, tuple) else (size, size)
-    kind = KINDS[name]
-    truth = kind.draw(rng, n, log_uniform(rng, low, high))
-    return {**truth, "size": kind.measure(truth, n), "where": kind.where(truth)}
+    kind, wanted = KINDS[name], log_uniform(rng, low, high)
+    truth = kind.draw(rng, n, wanted)
+    if kind.tuned:
+        truth = tune(machine, name, truth, n, wanted)
+    return {"size": kind.measure(truth, n), **truth, "where": kind.where(truth)}

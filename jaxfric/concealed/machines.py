@@ -16,13 +16,13 @@ SUBSTEP_RATE = 20_000.0
 class Plan(NamedTuple):
     """How a machine is recorded.
 
-    `kinds`: of the identification's and the held-out motion; `sample_rate` Hz; `count` samples;
+    `kinds`: of the identification's and the held-out motion; `sample_rate` Hz; `samples` of each;
     `period` s, one way there and back; `low` and `stroke` m, what the set-point visits.
     """
 
     kinds: tuple[str, str]
     sample_rate: float
-    count: int
+    samples: int
     period: float
     low: float
     stroke: float
@@ -82,7 +82,7 @@ def draw_plan(rng: Generator) -> Plan:
     """Sample rate 200 Hz to 10 kHz, 6 to 60 s, 20 to 100 reversals, stroke 1 mm to 30 m (rad)."""
     rate = log_uniform(rng, 200.0, 10_000.0)
     duration = min(max(log_uniform(rng, 4000, 60_000) / rate, 6.0), 60.0)
-    count = int(min(max(duration * rate, 4000), 60_000))
+    count = int(min(max(np.ceil(duration * rate), 4000), 60_000))
     # 240 samples a period leave room between the motion and the sampling for the loop.
     period = max(2 * count / rate / log_uniform(rng, 20, 100), 240 / rate, 0.06)
     names = sorted(motions.KINDS)
@@ -95,7 +95,7 @@ def draw_plan(rng: Generator) -> Plan:
 def reference(plan: Plan, seed: int, run: int):
     """Set-point of run 0 (identification) or 1 (held out): position m, velocity m/s, `(count,)`."""
     x, v = motions.motion(
-        plan.kinds[run], (seed, 3, run), 1 / plan.sample_rate, plan.count, plan.period
+        plan.kinds[run], (seed, 3, run), 1 / plan.sample_rate, plan.samples, plan.period
     )
     return plan.low + plan.stroke * x, plan.stroke * v
 
@@ -124,16 +124,22 @@ def tied(friction: Mapping[str, float]) -> dict[str, float]:
     return alike
 
 
-def draw_loop(rng: Generator, mass: float, coulomb: float, plan: Plan, slowest: bool):
+def draw_band(rng: Generator, plan: Plan, slowest: bool) -> float:
+    """Bandwidth of the position loop, rad/s.
+
+    It is 6 to 30 times the motion's frequency (8 if `slowest`) and below a fortieth of the sample
+    rate, where sampling and the velocity filter leave about 45° of phase.
+    """
+    band = log_uniform(rng, 6.0, 8.0 if slowest else 30.0) / plan.period
+    return 2 * np.pi * min(band, plan.sample_rate / 40)
+
+
+def draw_loop(rng: Generator, mass: float, coulomb: float, omega: float, plan: Plan):
     """Gains, encoder and the encoder's noise.
 
-    The bandwidth is 6 to 30 times the motion's frequency and below a fortieth of the sample rate,
-    where sampling and the velocity filter leave about 45° of phase. The encoder is as coarse as
-    makes the command rattle by 0.1 to 3 % of Coulomb friction.
+    The encoder is as coarse as makes the command rattle by 0.1 to 3 % of Coulomb friction.
     """
-    highest = 8.0 if slowest else 30.0
-    band = min(log_uniform(rng, 6.0, highest) / plan.period, plan.sample_rate / 40)
-    omega, interval = 2 * np.pi * band, 1 / plan.sample_rate
+    interval = 1 / plan.sample_rate
     kd = 2 * rng.uniform(0.8, 1.1) * mass * omega
     share = interval / (interval + 0.1 / omega)
     integral = rng.uniform(0.03, 0.2) * mass * omega**3 if rng.random() < 0.5 else 0.0
@@ -143,11 +149,11 @@ def draw_loop(rng: Generator, mass: float, coulomb: float, plan: Plan, slowest: 
     noise = rng.uniform(0.0, 0.5)  # in counts
     count = min(max(blur / np.sqrt(1 / 12 + noise**2), 1e-7 * plan.stroke), 3e-4 * plan.stroke)
     gains = {"kp": mass * omega**2, "ki": integral, "kd": kd, "velocity_filter": share}
-    return gains | {"resolution": count}, noise * count
+    return gains | {"resolution": float(count)}, float(noise * count)
 
 
 def draw_noise(rng: Generator, coulomb: float, encoder: float) -> Noise:
-    """Measured force 0.3 to 3 %, hidden load 0.2 to 0.8 % of Coulomb, clock up to 1 % of a sample."""
+    """Measured force 0.3–3 %, unrecorded load 0.2–0.8 % of Coulomb, clock up to 1 % of a sample."""
     jitter = log_uniform(rng, 1e-4, 1e-2) if rng.random() < 0.5 else 0.0
     return Noise(
         force=log_uniform(rng, 0.003, 0.03) * coulomb,

@@ -8,25 +8,40 @@ from .nominal import Kind, bump, rms, scaled, solved, travelled
 TURN = 2 * np.pi
 
 
-def _draw_presliding(rng, n, size):
+def _mean_coulomb(n):
+    return 0.5 * (n.physics["coulomb+"] + n.physics["coulomb-"])
+
+
+def _bristle_bounds(n):
     # The bristle's own vibration must be slow beside the substep.
-    force = 0.5 * (n.physics["coulomb+"] + n.physics["coulomb-"])
-    stable = 1.6 * force / n.mass * (n.substep / 0.3) ** 2
-    bounds = (max(1e-6 * n.plan.stroke, stable), 0.03 * n.plan.stroke)
-    truth = {"presliding_force": force}
-    return solved(PRESLIDING, "presliding_distance", truth, n, size, bounds)
+    stable = 1.6 * _mean_coulomb(n) / n.mass * (n.substep / 0.3) ** 2
+    shortest = max(1e-6 * n.plan.stroke, stable)
+    return shortest, max(0.03 * n.plan.stroke, 2 * shortest)
 
 
-PRESLIDING = Kind(
+def _draw_presliding(rng, n, size):
+    return solved(PRESLIDING, {"presliding_force": _mean_coulomb(n)}, n, size)
+
+
+def _bristle(truth, n):
+    """What a bristle lacks after a reversal, mean over each sample, of Coulomb and of the bump."""
+    since, length = travelled(n), truth["presliding_distance"]
+    until = since + np.abs(n.v) / n.plan.sample_rate
+    left = np.exp(-since / length) - np.exp(-until / length)
+    mean = left * length / np.maximum(until - since, 1e-9 * length)
+    level = truth["presliding_force"] + bump(n.physics, np.abs(n.v), n.way)
+    return -2 * level * n.way * np.minimum(mean, 1.0)
+
+
+PRESLIDING: Kind = Kind(
     _draw_presliding,
-    lambda truth, n: (
-        -2 * truth["presliding_force"] * n.way
-        * np.exp(-travelled(n) / truth["presliding_distance"])
-    ),
+    _bristle,
     lambda truth, base: {
         "presliding": 1.0, "presliding_distance": truth["presliding_distance"]
     },
     lambda truth: f"within {3 * truth['presliding_distance']:.3g} after a reversal",
+    tuned="presliding_distance",
+    bounds=_bristle_bounds,
 )  # fmt: skip
 
 
@@ -35,13 +50,13 @@ def _lagging(truth, n):
     return n.way * (bump(n.physics, late, n.way) - bump(n.physics, np.abs(n.v), n.way))
 
 
-FRICTION_LAG = Kind(
-    lambda rng, n, size: solved(
-        FRICTION_LAG, "frictional_lag", {}, n, size, (n.substep, 0.03 * n.plan.period)
-    ),
+FRICTION_LAG: Kind = Kind(
+    lambda rng, n, size: solved(FRICTION_LAG, {}, n, size),
     _lagging,
     lambda truth, base: {"friction_lag": truth["frictional_lag"]},
     lambda truth: "loops of friction over velocity at low speed",
+    tuned="frictional_lag",
+    bounds=lambda n: (n.substep, 0.03 * n.plan.period),
 )
 
 
@@ -56,7 +71,7 @@ def _hysteretic(truth, n):
     return truth["stiffness"] * np.abs(n.x - truth["rest"]) * deflection
 
 
-HYSTERETIC = Kind(
+HYSTERETIC: Kind = Kind(
     _draw_spread,
     _hysteretic,
     lambda truth, base: {
@@ -86,13 +101,13 @@ def _slowest(n):
     return 0.25 / n.bandwidth
 
 
-DELAY = Kind(
+DELAY: Kind = Kind(
     lambda rng, n, size: scaled(DELAY, "delay", {}, n, size, _slowest(n)),
     lambda truth, n: truth["delay"] * _rate(n),
     lambda truth, base: {"delay": truth["delay"]},
     lambda truth: "force rate",
 )
-LAG = Kind(
+LAG: Kind = Kind(
     lambda rng, n, size: scaled(LAG, "lag", {}, n, size, _slowest(n)),
     lambda truth, n: truth["lag"] * _rate(n),
     lambda truth, base: {"lag": truth["lag"]},
@@ -105,14 +120,14 @@ def _draw_swing(rng, n, size):
     return scaled(SWING, "delay", truth, n, size, 0.5 * _slowest(n))
 
 
-SWING = Kind(
+SWING: Kind = Kind(
     _draw_swing,
     lambda truth, n: truth["delay"] * (1 + np.sin(TURN * n.x / truth["period"])) * _rate(n),
     lambda truth, base: {"delay_swing": truth["delay"], "delay_period": truth["period"]},
     lambda truth: "force rate by position",
 )
 
-DEADBAND = Kind(
+DEADBAND: Kind = Kind(
     lambda rng, n, size: scaled(DEADBAND, "deadband", {}, n, size),
     lambda truth, n: truth["deadband"] * np.sign(n.u),
     lambda truth, base: {"deadband": truth["deadband"]},
@@ -126,7 +141,7 @@ def _draw_saturation(rng, n, size):
     )
 
 
-SATURATION = Kind(
+SATURATION: Kind = Kind(
     _draw_saturation,
     lambda truth, n: (
         truth["saturation"] * np.sign(n.u) * np.maximum(np.abs(n.u) - truth["knee"], 0.0)
@@ -134,7 +149,7 @@ SATURATION = Kind(
     lambda truth, base: {"saturation": truth["saturation"], "knee": truth["knee"]},
     lambda truth: f"force beyond {truth['knee']:.3g}",
 )
-GAIN = Kind(
+GAIN: Kind = Kind(
     lambda rng, n, size: scaled(GAIN, "gain_asymmetry", {}, n, size, 1.0),
     lambda truth, n: truth["gain_asymmetry"] * np.maximum(n.u, 0.0),
     lambda truth, base: {"gain": truth["gain_asymmetry"]},
@@ -148,9 +163,8 @@ GAIN = Kind(
 def _draw_gap(rng, n, size):
     truth = {"load_share": rng.uniform(0.3, 0.6), "load_friction_share": rng.uniform(0.3, 0.8)}
     truth["contact_rate"] = min(rng.uniform(6, 12) * n.bandwidth, 0.25 / n.substep)
-    bounds = (1e-5 * n.plan.stroke, 0.02 * n.plan.stroke)
-    truth = solved(BACKLASH, "half_gap", truth, n, size, bounds)
-    return truth | {"backlash_force": truth["load_friction_share"] * n.coulomb}
+    truth["backlash_force"] = truth["load_friction_share"] * n.coulomb
+    return solved(BACKLASH, truth, n, size)
 
 
 def _gap(truth, n):
@@ -171,24 +185,28 @@ def _coupled(truth, base, rate, damping):
     }
 
 
-BACKLASH = Kind(
+BACKLASH: Kind = Kind(
     _draw_gap,
     _gap,
     lambda truth, base: (
         _coupled(truth, base, truth["contact_rate"], 0.3) | {"half_gap": truth["half_gap"]}
     ),
     lambda truth: f"within {2 * truth['half_gap']:.3g} after a reversal",
+    tuned="half_gap",
+    bounds=lambda n: (1e-5 * n.plan.stroke, 0.02 * n.plan.stroke),
 )
 
 
 def _draw_compliance(rng, n, size):
     truth = {"load_share": rng.uniform(0.3, 0.7), "load_friction_share": rng.uniform(0.0, 0.5)}
     truth["damping_ratio"] = log_uniform(rng, 0.02, 0.1)
-    bounds = (n.substep / 0.25, 0.25 * n.plan.period / TURN)
-    truth = solved(COMPLIANCE, "time_constant", truth, n, size, bounds)
-    stiffness = truth["load_share"] * n.mass / truth["time_constant"] ** 2
-    first_order = (truth["load_share"] * n.mass) ** 2 / stiffness
-    return truth | {"stiffness": stiffness, "compliance": first_order}
+    return solved(COMPLIANCE, truth, n, size)
+
+
+def _stiffness(truth, n):
+    load = truth["load_share"] * n.mass
+    stiffness = load / truth["time_constant"] ** 2
+    return truth | {"stiffness": stiffness, "compliance": load**2 / stiffness}
 
 
 def _swinging(truth, n):
@@ -209,11 +227,15 @@ def _compliant(truth, base):
     return _coupled(truth, base, rate, truth["damping_ratio"])
 
 
-COMPLIANCE = Kind(
+COMPLIANCE: Kind = Kind(
     _draw_compliance,
     _swinging,
     _compliant,
     lambda truth: f"acceleration, ringing at {1 / (TURN * truth['time_constant']):.3g} Hz",
+    tuned="time_constant",
+    # From what the substep resolves to the motion's own frequency.
+    bounds=lambda n: (n.substep / 0.25, 0.25 * n.plan.period / TURN),
+    complete=_stiffness,
 )
 
 KINDS = {

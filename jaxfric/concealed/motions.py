@@ -1,4 +1,4 @@
-"""Set-points like those of commissioning runs: four kinds, each on a clock that need not be even."""
+"""Set-points like those of commissioning runs, of four kinds; all start from rest."""
 
 from collections.abc import Callable, Mapping
 
@@ -84,5 +84,7 @@ def motion(kind: str, seed: tuple[int, ...], interval: float, count: int, period
     `period` s is about that of one way there and back; `seed` is that of the motion alone.
     """
     time = np.arange(count) * interval
-    x = _unit(KINDS[kind](np.random.default_rng(seed), time, period))
+    x = KINDS[kind](np.random.default_rng(seed), time, period)
+    fade = np.clip(time / (0.5 * period), 0.0, 1.0)
+    x = _unit(x[0] + fade**3 * (10 - 15 * fade + 6 * fade**2) * (x - x[0]))
     return x, np.gradient(x, interval)

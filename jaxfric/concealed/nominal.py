@@ -46,13 +46,23 @@ class Nominal(NamedTuple):
         return float(np.sqrt(self.physics["kp"] / self.mass))
 
 
+def _unbounded(n: Nominal) -> tuple[float, float]:
+    return 0.0, np.inf
+
+
+def _as_it_is(truth: Truth, n: Nominal) -> Truth:
+    return truth
+
+
 class Kind(NamedTuple):
     """One kind of concealed effect.
 
     `draw(rng, nominal, size)`: its parameters; `force(truth, nominal)`: its force along a motion,
     N, to first order where it is no force; `physics(truth, base)`: the simulator's parameters;
     `where(truth)`: a sentence. With `centred`, the size counts the deviation of the force from its
-    mean only, since the baseline's constants take up the mean.
+    mean only, since the baseline's constants take up the mean. Where the loop shapes the force too
+    much for the set-point to tell its size, `tuned` names the parameter that is corrected by a
+    simulation, between `bounds(nominal)`; `complete` fills in what follows from it.
     """
 
     draw: Callable[[Generator, Nominal, float], Truth]
@@ -60,11 +70,19 @@ class Kind(NamedTuple):
     physics: Callable[[Truth, Mapping[str, float]], dict[str, float]]
     where: Callable[[Truth], str]
     centred: bool = False
+    tuned: str = ""
+    bounds: Callable[[Nominal], tuple[float, float]] = _unbounded
+    complete: Callable[[Truth, Nominal], Truth] = _as_it_is
 
     def measure(self, truth: Truth, nominal: Nominal) -> float:
         """The size: root mean square of the force in parts of the Coulomb level."""
         force = self.force(truth, nominal)
         return rms(force - np.mean(force) if self.centred else force) / nominal.coulomb
+
+
+def named(**names: str) -> Callable[[Truth, Mapping[str, float]], dict[str, float]]:
+    """Physics from truth by a table of names: the simulator's = the truth's."""
+    return lambda truth, base: {left: float(truth[right]) for left, right in names.items()}
 
 
 def rms(x: np.ndarray) -> float:
@@ -109,17 +127,17 @@ def scaled(kind: Kind, name: str, truth: Truth, n: Nominal, size: float, most=np
     return {**truth, name: float(min(size / unit, most)) if unit > 0 else 0.0}
 
 
-def solved(kind: Kind, name: str, truth: Truth, n: Nominal, size: float, bounds) -> Truth:
-    """The truth with the parameter `name`, with which the force grows, that makes `size`.
+def solved(kind: Kind, truth: Truth, n: Nominal, size: float) -> Truth:
+    """The truth with the parameter `kind.tuned`, with which the force grows, that makes `size`.
 
-    By bisection of its logarithm between the bounds; the nearer bound where neither reaches.
+    By bisection of its logarithm between `kind.bounds`; the nearer one where neither reaches.
     """
-    low, high = np.log(bounds[0]), np.log(max(bounds))
-    for _ in range(30):
+    low, high = np.log(kind.bounds(n))
+    for _ in range(25):
         middle = 0.5 * (low + high)
-        small = kind.measure({**truth, name: float(np.exp(middle))}, n) < size
+        small = kind.measure({**truth, kind.tuned: float(np.exp(middle))}, n) < size
         low, high = (middle, high) if small else (low, middle)
-    return {**truth, name: float(np.exp(0.5 * (low + high)))}
+    return kind.complete({**truth, kind.tuned: float(np.exp(0.5 * (low + high)))}, n)
 
 
 def reversals(n: Nominal) -> list[tuple[int, int]]:
@@ -137,6 +155,6 @@ def travelled(n: Nominal) -> np.ndarray:
     since = np.empty_like(path)
     for first, last in reversals(n):
         since[first:last] = path[first:last] - path[first]
-    first = reversals(n)[0]
-    since[first[0] : first[1]] += n.plan.stroke
+    start, stop = reversals(n)[0]
+    since[start:stop] += n.plan.stroke
     return since

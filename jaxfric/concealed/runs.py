@@ -1,12 +1,13 @@
 """Recording a machine twice: once to identify, once held out."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ..recording import Recording
 from . import physics, schedule
-from .drawing import KINDS
+from .kinds import KINDS
 from .machines import Machine, reference
 from .nominal import Nominal, direction, rms
 
@@ -17,7 +18,7 @@ class Run(NamedTuple):
     `recording`, `holdout`: with `position` as counted, `force` as measured and the channel
     `reference`, without velocity; `neighbour_velocity` with `cross_axis`. `hidden`,
     `hidden_holdout`: the force of each effect by name, N, `(N,)`: the part of the command beyond
-    the healthy machine's, mean over the sample that the command is held.
+    the healthy machine's, mean over the sample that the command is held. `true`: both motions.
     """
 
     recording: Recording
@@ -34,13 +35,33 @@ def record(machine: Machine) -> Run:
 
     The arrays have the caller's precision; the simulation has double precision.
     """
-    clocks = [_clock(machine, run) for run in (0, 1)]
-    stages = [_stage(machine, run, clock) for run, clock in enumerate(clocks)]
-    inputs = [stage[0] for stage in stages]
-    true = physics.run([dict(machine.physics)] * 2, inputs, machine.plan.substeps)
-    found = [_hide(machine, clocks[i], true[i], stages[i][1], i) for i in (0, 1)]
-    logs = [_log(machine, clocks[i], inputs[i], true[i], i) for i in (0, 1)]
-    return Run(*logs, *found, tuple(true))
+    runs = simulate([(machine, 0), (machine, 1)])
+    logs = [_log(machine, run, number) for number, run in enumerate(runs)]
+    first, second = runs
+    return Run(logs[0], logs[1], first.hidden, second.hidden, (first.true, second.true))
+
+
+class Simulated(NamedTuple):
+    """One run: the clock s `(N,)`, the simulator's inputs and outputs, each effect's force N."""
+
+    clock: np.ndarray
+    inputs: physics.Inputs
+    true: physics.Motion
+    hidden: dict[str, np.ndarray]
+
+
+def simulate(runs: Sequence[tuple[Machine, int]]) -> list[Simulated]:
+    """Machines with one plan, each with the number of its run: 0 to identify, 1 held out."""
+    clocks = [_clock(machine, run) for machine, run in runs]
+    staged = [_stage(*which, clock) for which, clock in zip(runs, clocks, strict=True)]
+    inputs = [stage[0] for stage in staged]
+    substeps = runs[0][0].plan.substeps
+    true = physics.run([dict(machine.physics) for machine, _ in runs], inputs, substeps)
+    found = []
+    for i, (machine, run) in enumerate(runs):
+        hidden = _hide(machine, clocks[i], true[i], staged[i][1], run)
+        found.append(Simulated(clocks[i], inputs[i], true[i], hidden))
+    return found
 
 
 def _rng(machine, run, what):
@@ -49,7 +70,7 @@ def _rng(machine, run, what):
 
 def _clock(machine: Machine, run: int) -> np.ndarray:
     """The true times of the samples, s: even ones, each off by up to the jitter."""
-    count, rate = machine.plan.count, machine.plan.sample_rate
+    count, rate = machine.plan.samples, machine.plan.sample_rate
     off = _rng(machine, run, 0).uniform(-1, 1, count) * machine.noise.jitter
     return (np.arange(count) + off - off[0]) / rate
 
@@ -75,15 +96,15 @@ def _stage(machine: Machine, run: int, clock: np.ndarray):
     """Inputs of the simulator, and the load that the effects alone make."""
     plan, noise = machine.plan, machine.noise
     goal, speed = reference(plan, machine.seed, run)
-    even = np.arange(plan.count) / plan.sample_rate
+    even = np.arange(plan.samples) / plan.sample_rate
     goal, speed = np.interp(clock, even, goal), np.interp(clock, even, speed)
     interval = np.append(np.diff(clock), 1 / plan.sample_rate)
     # The mean of a slow load over a sample is its value in the middle.
     n = _motion(machine, clock + 0.5 * interval)
     timed = schedule.columns(machine.truth, n, run)
     correlation = noise.correlation * plan.sample_rate
-    process = noise.process * _coloured(_rng(machine, run, 1), plan.count, correlation)
-    blur = noise.encoder * _rng(machine, run, 2).normal(size=plan.count)
+    process = noise.process * _coloured(_rng(machine, run, 1), plan.samples, correlation)
+    blur = noise.encoder * _rng(machine, run, 2).normal(size=plan.samples)
     columns = (interval, goal, speed, timed.load + process, timed.coulomb, timed.viscous, blur)
     return physics.Inputs(*columns), timed.load
 
@@ -144,13 +165,15 @@ def _known(name, machine, n, run):
     return force
 
 
-def _log(machine: Machine, clock, inputs, true, run) -> Recording:
+def _log(machine: Machine, found: Simulated, run: int) -> Recording:
+    clock = found.clock
     force = machine.noise.force * _rng(machine, run, 3).normal(size=clock.size)
-    channels = {"reference": inputs.goal}
+    channels = {"reference": found.inputs.goal}
     if "cross_axis" in machine.effects:
         truth = machine.truth["cross_axis"]
         speed, _ = schedule.neighbour(truth, machine.plan, run, clock)
         noise = 1e-3 * rms(speed) * _rng(machine, run, 4).normal(size=clock.size)
         channels["neighbour_velocity"] = speed + noise
     name = f"machine {machine.seed}, {('identification', 'held out')[run]}"
+    true = found.true
     return Recording(clock, true.force + force, true.counted, channels=channels, source=name)

@@ -47,7 +47,7 @@ def _draw_thermal(rng, n, size):
     return truth | {f"thermal_{truth['law']}": truth["amount"]}
 
 
-THERMAL = Kind(
+THERMAL: Kind = Kind(
     _draw_thermal,
     _thermal_force,
     _nothing,
@@ -63,7 +63,7 @@ def _draw_step(rng, n, size):
     return {**truth, "step_coulomb": sign * truth["step_coulomb"]}
 
 
-STEP = Kind(
+STEP: Kind = Kind(
     _draw_step,
     lambda truth, n: truth["step_coulomb"] * n.way * (n.time > truth["step_time"]),
     _nothing,
@@ -85,7 +85,7 @@ def _drift(truth, n):
     return legendre.legval(tau, [0.0, *truth["polynomials"]])
 
 
-DRIFT = Kind(_draw_drift, _drift, _nothing, lambda truth: "time, slowly")
+DRIFT: Kind = Kind(_draw_drift, _drift, _nothing, lambda truth: "time, slowly")
 
 
 def _draw_tone(rng, n, size):
@@ -96,7 +96,7 @@ def _draw_tone(rng, n, size):
     return scaled(TONE, "amplitude", truth, n, size)
 
 
-TONE = Kind(
+TONE: Kind = Kind(
     _draw_tone,
     lambda truth, n: (
         truth["amplitude"] * np.sin(TURN * truth["frequency"] * n.time + truth["phase"])
@@ -128,7 +128,7 @@ def _pulses(truth, n, times="times"):
     return total
 
 
-PULSES = Kind(
+PULSES: Kind = Kind(
     _draw_pulses, _pulses, _nothing, lambda truth: f"time, {len(truth['times'])} isolated pushes"
 )
 
@@ -137,8 +137,8 @@ def neighbour(truth, plan, run, time):
     """Velocity and acceleration of the other axis in a run, m/s and m/s², `(N,)`."""
     interval = 1 / plan.sample_rate
     seed = (truth["seed"], 4, run)
-    _, v = motions.motion(truth["kind"], seed, interval, plan.count, 1.3 * plan.period)
-    even = np.arange(plan.count) * interval
+    _, v = motions.motion(truth["kind"], seed, interval, plan.samples, 1.3 * plan.period)
+    even = np.arange(plan.samples) * interval
     v = np.interp(time, even, plan.stroke * v)
     return v, np.gradient(v, time)
 
@@ -157,7 +157,7 @@ def _cross(truth, n, run=0):
     return truth["coupling_inertia"] * a + truth["coupling_viscous"] * v
 
 
-CROSS = Kind(_draw_cross, _cross, _nothing, lambda truth: "the other axis' motion")
+CROSS: Kind = Kind(_draw_cross, _cross, _nothing, lambda truth: "the other axis' motion")
 
 
 KINDS = {

@@ -1,115 +1,16 @@
-"""Concealed forces that are functions of position, velocity, or both."""
+"""Concealed forces that depend on where the axis is."""
 
 import numpy as np
 
-from .machines import SHAPES, log_uniform
-from .nominal import Kind, Truth, rms, scaled
+from .machines import log_uniform
+from .nominal import Kind, Truth, named, rms, scaled
 
 TURN = 2 * np.pi
-
-
-def _named(**names):
-    """Physics from truth by a table of names, the simulator's on the left."""
-    return lambda truth, base: {left: float(truth[right]) for left, right in names.items()}
 
 
 def _at(n, share):
     """The place below which the motion spends that share of the time, m."""
     return float(np.quantile(n.x, share))
-
-
-# Friction of velocity
-
-
-def _draw_asymmetry(rng, n, size):
-    truth = {"coulomb_asymmetry": rng.uniform(-1, 1) * size * n.coulomb}
-    truth = scaled(ASYMMETRY, "viscous_asymmetry", truth, n, size)
-    return {**truth, "viscous_asymmetry": rng.choice([-1, 1]) * truth["viscous_asymmetry"]}
-
-
-def _asymmetric(truth, base):
-    # The slower of the two directions keeps a third of the mean viscous friction.
-    viscous = max(base["viscous+"], 1.5 * abs(truth["viscous_asymmetry"]))
-    return {
-        "coulomb+": base["coulomb+"] + truth["coulomb_asymmetry"],
-        "coulomb-": base["coulomb-"] - truth["coulomb_asymmetry"],
-        "viscous+": viscous + truth["viscous_asymmetry"],
-        "viscous-": viscous - truth["viscous_asymmetry"],
-    }
-
-
-ASYMMETRY = Kind(
-    _draw_asymmetry,
-    # Coulomb asymmetry is a constant in slip, but for dwells: the size is that of the viscous part.
-    lambda truth, n: truth["viscous_asymmetry"] * np.abs(n.v),
-    _asymmetric,
-    lambda truth: "viscous friction differs between the directions",
-    centred=True,
-)
-
-
-def _shape(name, ratio):
-    return {"gaussian": np.exp(-(ratio**2)), "lorentzian": 1 / (1 + ratio**2)}.get(
-        name, np.exp(-ratio)
-    )
-
-
-def _draw_stribeck(rng, n, size):
-    width = log_uniform(rng, 0.03, 0.15) * n.top
-    truth = {"shape": SHAPES[rng.integers(3)], "stribeck_velocity": width}
-    return scaled(STRIBECK, "stribeck_force", truth, n, size, 0.8 * n.coulomb)
-
-
-def _stribeck(truth, base):
-    both = {f"bump{s}": truth["stribeck_force"] for s in "+-"}
-    both |= {f"bump_speed{s}": truth["stribeck_velocity"] for s in "+-"}
-    return both | {"bump_shape": float(SHAPES.index(truth["shape"]))}
-
-
-STRIBECK = Kind(
-    _draw_stribeck,
-    lambda truth, n: (
-        truth["stribeck_force"]
-        * n.way
-        * _shape(truth["shape"], np.abs(n.v) / truth["stribeck_velocity"])
-    ),
-    _stribeck,
-    lambda truth: f"speeds below {3 * truth['stribeck_velocity']:.3g}",
-)
-
-
-def _draw_viscous(rng, n, size):
-    form = ("quadratic", "shear_thinning", "power")[rng.integers(3)]
-    truth: Truth = {"form": form}
-    if form == "quadratic":
-        return scaled(VISCOUS, "quadratic_drag", truth, n, size)
-    if form == "shear_thinning":
-        truth["thinning_velocity"] = log_uniform(rng, 0.1, 0.5) * n.top
-        return scaled(VISCOUS, "thinning_viscous", truth, n, size)
-    truth |= {"unit_speed": n.top, "exponent": float(rng.choice([0.5, 2.0, 2.5, 3.0]))}
-    return scaled(VISCOUS, "power_force", truth, n, size)
-
-
-def _viscous_force(truth, n):
-    speed = np.abs(n.v)
-    if truth["form"] == "quadratic":
-        return truth["quadratic_drag"] * n.v * speed
-    if truth["form"] == "shear_thinning":
-        return truth["thinning_viscous"] * n.v / (1 + speed / truth["thinning_velocity"])
-    return truth["power_force"] * n.way * (speed / truth["unit_speed"]) ** truth["exponent"]
-
-
-_FORMS = {
-    "quadratic": _named(drag="quadratic_drag"),
-    "shear_thinning": _named(thinning="thinning_viscous", thinning_speed="thinning_velocity"),
-    "power": _named(power="power_force", power_speed="unit_speed", exponent="exponent"),
-}
-VISCOUS = Kind(
-    _draw_viscous,
-    _viscous_force,
-    lambda truth, base: _FORMS[truth["form"]](truth, base),
-    lambda truth: "curvature of friction over speed",
-)
 
 
 # Functions of position
@@ -128,10 +29,10 @@ def _wave(period):
     return lambda truth, n: truth["amplitude"] * np.sin(TURN * n.x / truth[period] + truth["phase"])
 
 
-UNBALANCE = Kind(
+UNBALANCE: Kind = Kind(
     _draw_unbalance,
     _wave("unbalance_period"),
-    _named(unbalance="amplitude", unbalance_period="unbalance_period", unbalance_phase="phase"),
+    named(unbalance="amplitude", unbalance_period="unbalance_period", unbalance_phase="phase"),
     lambda truth: f"position, one turn in {truth['unbalance_period']:.4g}",
     centred=True,
 )
@@ -161,7 +62,7 @@ def _cogging(truth, base):
     return found
 
 
-COGGING = Kind(
+COGGING: Kind = Kind(
     _draw_cogging, _cogging_force, _cogging, lambda t: f"position, pitch {t['pitch']:.4g}"
 )
 
@@ -171,10 +72,10 @@ def _draw_spring(rng, n, size):
     return scaled(SPRING, "stiffness", truth, n, size)
 
 
-SPRING = Kind(
+SPRING: Kind = Kind(
     _draw_spring,
     lambda truth, n: truth["stiffness"] * (n.x - truth["rest"]),
-    _named(spring="stiffness", spring_rest="rest"),
+    named(spring="stiffness", spring_rest="rest"),
     lambda truth: "position, over the whole stroke",
     centred=True,
 )
@@ -185,10 +86,10 @@ def _draw_hardening(rng, n, size):
     return scaled(HARDENING, "cubic_stiffness", truth, n, size)
 
 
-HARDENING = Kind(
+HARDENING: Kind = Kind(
     _draw_hardening,
     lambda truth, n: truth["cubic_stiffness"] * (n.x - truth["spring_centre"]) ** 3,
-    _named(cubic="cubic_stiffness", cubic_centre="spring_centre"),
+    named(cubic="cubic_stiffness", cubic_centre="spring_centre"),
     lambda truth: "position, near both ends of the stroke",
     centred=True,
 )
@@ -203,6 +104,7 @@ def _draw_stop(rng, n, size):
     stiffness = "stop_stiffness" if upper else "lower_stop_stiffness"
     truth = scaled(STOP, stiffness, truth, n, size)
     # The stop pushes the axis back by k/(k + kp) of the way that the set-point goes into it.
+    truth["size"] = STOP.measure(truth, n)
     asked, loop = truth[stiffness], n.physics["kp"]
     truth[stiffness] = asked * loop / max(loop - asked, 0.3 * loop)
     return truth
@@ -221,7 +123,9 @@ def _stop(truth, base):
     return {"lower_stop": truth["lower_stop_stiffness"], "lower_stop_at": where}
 
 
-STOP = Kind(_draw_stop, _stop_force, _stop, lambda truth: f"the {truth['side']} end of the stroke")
+STOP: Kind = Kind(
+    _draw_stop, _stop_force, _stop, lambda truth: f"the {truth['side']} end of the stroke"
+)
 
 
 # Friction of position
@@ -232,10 +136,10 @@ def _draw_wavy(rng, n, size):
     return scaled(WAVY, "amplitude", truth, n, size, 0.7 * n.coulomb)
 
 
-WAVY = Kind(
+WAVY: Kind = Kind(
     _draw_wavy,
     lambda truth, n: n.way * _wave("friction_period")(truth, n),
-    _named(
+    named(
         wavy_friction="amplitude",
         wavy_friction_period="friction_period",
         wavy_friction_phase="phase",
@@ -256,14 +160,14 @@ def _draw_spot(rng, n, size):
     return truth
 
 
-SPOT = Kind(
+SPOT: Kind = Kind(
     _draw_spot,
     lambda truth, n: (
         truth["spot_force"]
         * n.way
         * np.exp(-0.5 * ((n.x - truth["spot_position"]) / truth["spot_width"]) ** 2)
     ),
-    _named(spot="spot_force", spot_at="spot_position", spot_width="spot_width"),
+    named(spot="spot_force", spot_at="spot_position", spot_width="spot_width"),
     lambda truth: f"position by direction, at {truth['spot_position']:.4g}",
 )
 
@@ -282,41 +186,15 @@ def _inertia_force(truth, n):
     return truth["amplitude"] * (n.a * np.sin(angle) + 0.5 * rate * n.v**2 * np.cos(angle))
 
 
-INERTIA = Kind(
+INERTIA: Kind = Kind(
     _draw_inertia,
     _inertia_force,
-    _named(wavy_mass="amplitude", wavy_mass_period="inertia_period", wavy_mass_phase="phase"),
+    named(wavy_mass="amplitude", wavy_mass_period="inertia_period", wavy_mass_phase="phase"),
     lambda truth: f"position by acceleration, period {truth['inertia_period']:.4g}",
 )
 
 
-LOADED = Kind(
-    lambda rng, n, size: scaled(LOADED, "load_friction", {}, n, size, 0.5),
-    lambda truth, n: truth["load_friction"] * np.abs(n.u) * n.way,
-    _named(load_friction="load_friction"),
-    lambda truth: "force by direction",
-)
-
-
-def _draw_rated(rng, n, size):
-    truth = {"acceleration_scale": rng.uniform(0.2, 0.6) * float(np.quantile(np.abs(n.a), 0.98))}
-    return scaled(RATED, "level", truth, n, size, 1.0 * n.coulomb)
-
-
-RATED = Kind(
-    _draw_rated,
-    lambda truth, n: (
-        truth["level"] * n.way * np.abs(n.a) / (np.abs(n.a) + truth["acceleration_scale"])
-    ),
-    _named(acceleration_friction="level", acceleration_scale="acceleration_scale"),
-    lambda truth: "friction that grows with acceleration of either sign",
-)
-
-
 KINDS = {
-    "asymmetric_friction": ASYMMETRY,
-    "stribeck": STRIBECK,
-    "viscous_nonlinearity": VISCOUS,
     "gravity_unbalance": UNBALANCE,
     "cogging": COGGING,
     "spring": SPRING,
@@ -325,6 +203,4 @@ KINDS = {
     "position_dependent_friction": WAVY,
     "sticky_spot": SPOT,
     "position_dependent_inertia": INERTIA,
-    "load_dependent_friction": LOADED,
-    "acceleration_dependent_friction": RATED,
 }

@@ -1,0 +1,69 @@
+"""Correcting the size of an effect that the closed loop shapes, by one simulation."""
+
+import dataclasses
+
+import numpy as np
+
+from .kinds import KINDS
+from .machines import Machine
+from .nominal import Nominal, Truth, rms
+from .runs import simulate
+
+# Both ways from the parameter that the set-point's motion suggests.
+_STEP = 2.0
+
+
+# A size is drawn from a range of a decade: a sixth more or less is as drawn.
+_CLOSE = 0.15
+_ROUNDS = 3
+
+
+def tune(machine: Machine, name: str, truth: Truth, n: Nominal, size: float) -> Truth:
+    """The truth of one effect with `Kind.tuned` such that its force has the size in closed loop.
+
+    The size in `truth` is what was reached: it can differ where the parameter meets a bound.
+    """
+    for _ in range(_ROUNDS):
+        truth, foreseen = _improved(machine, name, truth, n, size)
+        if foreseen:
+            break
+    return truth
+
+
+def _improved(machine, name, truth, n, size):
+    """A better truth, and whether its size lies between two that were simulated.
+
+    Two machines with the parameter half and double as large, and only this effect, run the
+    identification's motion; size over parameter is taken as a power law between and, by no more
+    than another factor of two, beyond them.
+    """
+    kind = KINDS[name]
+    low, high = kind.bounds(n)
+    first = truth[kind.tuned]
+    tried = np.clip([first / _STEP, first * _STEP], low, high)
+    truths = [kind.complete({**truth, kind.tuned: float(value)}, n) for value in tried]
+    sizes = _sizes(machine, name, truths)
+    span = np.diff(np.log(tried))[0]
+    # A size that does not grow with the parameter says nothing about where to look for more.
+    slope = max(np.diff(np.log(sizes))[0] / span, 0.1)
+    wanted = tried[0] * (size / sizes[0]) ** (1 / slope)
+    value = float(np.clip(wanted, max(low, tried[0] / _STEP), min(high, tried[1] * _STEP)))
+    reached = float(sizes[0] * (value / tried[0]) ** slope)
+    between = tried[0] * np.exp(-_CLOSE) < value < tried[1] * np.exp(_CLOSE)
+    better = kind.complete({**truth, kind.tuned: value}, n) | {"size": reached}
+    return better, between or wanted < low or wanted > high
+
+
+def _sizes(machine, name, truths):
+    kind = KINDS[name]
+    twins = [
+        dataclasses.replace(
+            machine,
+            effects=(name,),
+            physics={**machine.physics, **kind.physics(truth, machine.physics)},
+            truth={name: truth},
+        )
+        for truth in truths
+    ]
+    found = simulate([(twin, 0) for twin in twins])
+    return np.maximum([rms(each.hidden[name]) / machine.coulomb for each in found], 1e-9)

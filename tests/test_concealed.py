@@ -1,0 +1,147 @@
+"""Machines with something concealed in them are what they say they are."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+from jaxfric import concealed, models
+from jaxfric.catalogue import CATALOGUE
+from jaxfric.concealed.kinds import KINDS
+from jaxfric.concealed.nominal import friction, rms
+
+SIZE = 0.12
+# Where a lag makes the force differ most, at a reversal, its size does not count (slip alone does).
+IN_SLIP = {"transport_delay", "actuator_lag", "position_dependent_delay"}
+
+
+def quick(seed, effects=(), size=SIZE):
+    """A machine whose recordings are the first 4000 samples of what it would do."""
+    machine = concealed.draw(seed, effects, size)
+    return dataclasses.replace(machine, plan=machine.plan._replace(samples=4000))
+
+
+def slip_residual(machine, run, hold=0):
+    """Measured force beyond M a + friction + hidden force on the samples in slip, N."""
+    log = (run.recording, run.holdout)[hold]
+    hidden = (run.hidden, run.hidden_holdout)[hold]
+    true, physics = run.true[hold], dict(machine.physics)
+    if "stribeck" in machine.effects:
+        physics |= {"bump+": 0.0, "bump-": 0.0}
+    if "asymmetric_friction" in machine.effects:
+        for name in ("coulomb", "viscous"):
+            mean = 0.5 * (physics[f"{name}+"] + physics[f"{name}-"])
+            physics |= {f"{name}+": mean, f"{name}-": mean}
+    v = 0.5 * (true.velocity[1:] + true.velocity[:-1])
+    a = np.diff(true.velocity) / np.diff(np.asarray(log.time))
+    slip = np.abs(v) > 0.05 * np.quantile(np.abs(v), 0.98)
+    slip &= true.velocity[1:] * true.velocity[:-1] > 0
+    known = physics["mass"] * a + friction(physics, v, np.sign(v))
+    known = known + sum((force[:-1] for force in hidden.values()), np.zeros_like(v))
+    return (np.asarray(log.force)[:-1] - known)[slip]
+
+
+def expected_noise(machine):
+    return float(np.hypot(machine.noise.force, machine.noise.process))
+
+
+def test_every_effect_of_the_catalogue_can_be_concealed_but_a_wrong_parameter():
+    assert set(concealed.NAMES) == {e.name for e in CATALOGUE} - {"parameter_mismatch"}
+    assert not set(concealed.OUTSIDE) & {e.name for e in CATALOGUE}
+
+
+def test_the_same_seed_is_the_same_machine_and_another_is_not():
+    assert concealed.draw(3, ("cogging",)) == concealed.draw(3, ("cogging",))
+    assert concealed.draw(3) != concealed.draw(4)
+    first, second = concealed.record(quick(3)), concealed.record(quick(3))
+    np.testing.assert_array_equal(first.recording.force, second.recording.force)
+    np.testing.assert_array_equal(first.holdout.position, second.holdout.position)
+
+
+def test_what_is_healthy_about_a_machine_does_not_depend_on_what_is_concealed():
+    healthy, sick = concealed.draw(5), concealed.draw(5, ("cogging",))
+    changed = {k for k in healthy.physics if healthy.physics[k] != sick.physics[k]}
+    assert changed and all(k.startswith(("cogging", "pitch")) for k in changed)
+    assert (healthy.plan, healthy.noise) == (sick.plan, sick.noise)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_a_healthy_machine_is_mass_times_acceleration_and_friction(seed):
+    machine = quick(seed)
+    run = concealed.record(machine)
+    assert run.hidden == {} and machine.baseline in models.names()
+    for hold in (0, 1):
+        residual = slip_residual(machine, run, hold)
+        assert rms(residual) < 1.4 * expected_noise(machine)
+
+
+def test_the_held_out_run_is_another_one():
+    run = concealed.record(quick(1))
+    position, other = np.asarray(run.recording.position), np.asarray(run.holdout.position)
+    assert abs(np.corrcoef(position, other)[0, 1]) < 0.9
+    force, other = np.asarray(run.recording.force), np.asarray(run.holdout.force)
+    assert abs(np.corrcoef(force, other)[0, 1]) < 0.9
+    assert run.recording.velocity is None and "reference" in run.recording.channels
+
+
+def test_machines_spread_over_units_and_sample_rates():
+    machines = [concealed.draw(seed) for seed in range(40)]
+    levels = np.log10([machine.coulomb for machine in machines])
+    rates = np.log10([machine.plan.sample_rate for machine in machines])
+    assert np.ptp(levels) > 6 and np.ptp(rates) > 1.2
+    assert {machine.baseline for machine in machines} >= {"gaussian", "lorentzian", "exponential"}
+    for machine in machines:
+        assert 4000 <= machine.plan.samples <= 60_000
+        assert 6 <= machine.plan.samples / machine.plan.sample_rate <= 60.1
+
+
+def check(name, seed, machine, run):
+    """A concealed effect is finite, moves the axis, explains the force and has its size."""
+    hidden = run.hidden[name]
+    position = np.asarray(run.recording.position)
+    assert np.all(np.isfinite(hidden)) and np.all(np.isfinite(run.hidden_holdout[name]))
+    assert np.ptp(position) > 0.6 * machine.plan.stroke
+    assert rms(slip_residual(machine, run)) < 1.4 * expected_noise(machine)
+    size = machine.truth[name]["size"]
+    force = hidden - np.mean(hidden) if KINDS[name].centred else hidden
+    acting = rms(force) / machine.coulomb
+    most = 4.0 if name in IN_SLIP else 1.6
+    assert size / 1.6 < acting < most * size, (name, seed, size, acting)
+
+
+@pytest.mark.parametrize("name", ["spring", "sticky_spot", "friction_step", "actuator_deadband"])
+def test_an_effect_is_there_and_as_large_as_drawn(name):
+    machine = concealed.draw(9, (name,), SIZE)
+    check(name, 9, machine, concealed.record(machine))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", KINDS)
+def test_every_effect_is_there_and_as_large_as_drawn(name):
+    for seed in (101, 103, 105):
+        machine = concealed.draw(seed, (name,), SIZE)
+        check(name, seed, machine, concealed.record(machine))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pair", [("cogging", "transport_delay"), ("presliding", "spring")])
+def test_two_effects_share_the_hidden_force(pair):
+    machine = concealed.draw(7, pair, SIZE)
+    run = concealed.record(machine)
+    assert set(run.hidden) == set(machine.truth) == set(pair)
+    assert rms(slip_residual(machine, run)) < 1.4 * expected_noise(machine)
+
+
+def test_a_caller_in_single_precision_gets_it():
+    with jax.enable_x64(False):
+        run = concealed.record(quick(0))
+        assert run.recording.position.dtype == np.float32
+    assert run.true[0].position.dtype == np.float64
+
+
+def test_what_cannot_be_concealed_is_said():
+    with pytest.raises(ValueError, match=r"No effect rust .*there are .*cogging"):
+        concealed.draw(0, ("rust",))
+    with pytest.raises(ValueError, match="named twice"):
+        concealed.draw(0, ("spring", "spring"))
