@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..terms.base import AbstractTerm
-from .candidates import Candidate, Field
-from .chance import Judge, adjusted, blocks, thresholds
+from .candidates import Candidate, Field, scaled
+from .chance import DRAWS, Judge, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .predictions import with_predictions
+from .pulses import pulses
 from .regression import Fit, fit
 
 # A term is believed if chance would do as well somewhere in one case of a hundred.
@@ -88,6 +89,10 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
             zip(field.candidates, scans, p_values, least, strict=True)
         )
     ]
+    for candidate in pulses(seen, now):
+        raw = scaled(candidate.columns(seen))
+        # Signs of blocks say nothing about single events: what stands out has been tested.
+        trials.append(_trial(judge, candidate, raw, judge(raw), 1 / (1 + DRAWS), np.inf))
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.chance for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))

@@ -43,11 +43,18 @@ def ask(
     **Arguments:** `known`: the model to align by, by default the baseline.
     """
     motion = _from_position(recording)
-    first = gather(motion)
-    wide = _wider(motion, first.width)
-    delay = _alignment([first] if wide is None else [first, wide], structure, known)
-    evidence = gather(motion, first.width, delay)
-    wide = None if wide is None else gather(motion, wide.width, delay)
+    evidence = gather(motion)
+    wide, delay, sample = _wider(motion, evidence.width), 0.0, evidence.limits.interval
+    # To first order a delay is a column; the first estimate is good to a fifth of a sample.
+    for _ in range(3):
+        late = _lateness([evidence] if wide is None else [evidence, wide], structure, known)
+        step, delay = delay, delay - late
+        if abs(delay) > sample:
+            delay = -0.5 * sample
+        evidence = gather(motion, evidence.width, delay)
+        wide = None if wide is None else gather(motion, wide.width, delay)
+        if abs(delay - step) < 0.5 * ALIGNED * sample:
+            break
     held = None
     if holdout is not None:
         held = gather(_from_position(holdout), evidence.width, delay)
@@ -70,8 +77,8 @@ def _from_position(recording: Recording) -> Recording:
     return dataclasses.replace(recording, velocity=None)
 
 
-def _alignment(views: list[Evidence], structure: AbstractTerm, known: Fit | None) -> float:
-    """How much later the force is to be taken, s, to belong to the same instant as the position.
+def _lateness(views: list[Evidence], structure: AbstractTerm, known: Fit | None) -> float:
+    """How much earlier the force is than belongs to the same instant as the position, s.
 
     A force that is held from sample to sample acts half a sample late, a controller that needs the
     cycle for its computation one more: within a sample either way it is a matter of logging, which
@@ -89,8 +96,7 @@ def _alignment(views: list[Evidence], structure: AbstractTerm, known: Fit | None
         seen = with_predictions(seen, now)
         both = fit([*terms, laws.TransportDelay()], seen, [*now.betas, None])
         delays.append(float(both.alphas[-1][0]))
-    delay = delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
-    return -delay if abs(delay) <= sample else -0.5 * sample
+    return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
 
 
 _SHARP_TERMS = (laws.TransportDelay, laws.ActuatorLag, laws.Compliance, laws.FrictionalLag)

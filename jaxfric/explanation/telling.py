@@ -43,7 +43,7 @@ def tell(
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
     return Explanation(
-        verdict=_verdict(bool(findings), before, after),
+        verdict=_verdict(bool(findings), before, after, _rough(found, asked)),
         where=[_where(place, units) for place in before],
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(found, asked, first),
@@ -92,10 +92,21 @@ def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) ->
     return [place for place in places if sure or place.coordinate != "force_rate"]
 
 
-def _verdict(named: bool, before: list[Place], after: list[Place]) -> str:
+# A residual of four times the power of its own fast part is no noise, though nothing says where.
+ROUGH = 2.0
+
+
+def _rough(found: Named, asked: Question) -> bool:
+    """Whether what is left is far from the noise that neighbouring rows show."""
+    error = verification.error(found.last, asked.evidence)
+    floor = verification.noise(found.last, asked.evidence.target)
+    return error > ROUGH * floor and error > LINEARITY
+
+
+def _verdict(named: bool, before: list[Place], after: list[Place], rough: bool) -> str:
     if named:
-        return "partly_explained" if after else "explained"
-    return "unexplained" if before else "consistent"
+        return "partly_explained" if after or rough else "explained"
+    return "unexplained" if before or rough else "consistent"
 
 
 def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]:

@@ -88,6 +88,8 @@ def smallest_visible(contest: Contest, now: Fit) -> dict[str, float]:
     found: dict[str, float] = {}
     for trial in contest.trials:
         least = max(LEAST_SHARE, trial.threshold)
+        if not np.isfinite(least):
+            continue
         size = level * np.sqrt(least) / max(trial.fresh, 1e-3)
         name = trial.candidate.effect.name
         found[name] = min(size, found.get(name, np.inf))
