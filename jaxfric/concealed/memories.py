@@ -198,8 +198,10 @@ BACKLASH: Kind = Kind(
 
 
 def _draw_compliance(rng, n, size):
-    truth = {"load_share": rng.uniform(0.3, 0.7), "load_friction_share": rng.uniform(0.0, 0.5)}
-    truth["damping_ratio"] = log_uniform(rng, 0.02, 0.1)
+    # Sampling and the velocity filter turn the loop's damping into its opposite at ten times the
+    # bandwidth; a joint with less damping of its own than a tenth would ring for ever there.
+    truth = {"load_share": rng.uniform(0.3, 0.5), "load_friction_share": rng.uniform(0.0, 0.5)}
+    truth["damping_ratio"] = rng.uniform(0.1, 0.2)
     return solved(COMPLIANCE, truth, n, size)
 
 

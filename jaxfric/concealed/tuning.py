@@ -66,4 +66,6 @@ def _sizes(machine, name, truths):
         for truth in truths
     ]
     found = simulate([(twin, 0) for twin in twins])
-    return np.maximum([rms(each.hidden[name]) / machine.coulomb for each in found], 1e-9)
+    sizes = np.array([rms(each.hidden[name]) / machine.coulomb for each in found])
+    # A loop that bursts is too large an effect.
+    return np.clip(np.nan_to_num(sizes, nan=np.inf), 1e-6, 1e3)
