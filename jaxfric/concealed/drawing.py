@@ -50,7 +50,7 @@ def draw(
     effects = tuple(effects)
     _check(effects)
     rng = np.random.default_rng((seed, 0))
-    plan = draw_plan(rng)
+    plan = draw_plan(rng, seed)
     time = np.arange(plan.samples) / plan.sample_rate
     x, v = reference(plan, seed, 0)
     coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))

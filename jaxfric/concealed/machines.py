@@ -17,15 +17,21 @@ class Plan(NamedTuple):
     """How a machine is recorded.
 
     `kinds`: of the identification's and the held-out motion; `sample_rate` Hz; `samples` of each;
-    `period` s, one way there and back; `low` and `stroke` m, what the set-point visits.
+    `periods` s, one way there and back of each motion; `low` and `stroke` m, what the set-point
+    visits.
     """
 
     kinds: tuple[str, str]
     sample_rate: float
     samples: int
-    period: float
+    periods: tuple[float, float]
     low: float
     stroke: float
+
+    @property
+    def period(self) -> float:
+        """Of the identification's motion, s."""
+        return self.periods[0]
 
     @property
     def substeps(self) -> int:
@@ -78,7 +84,7 @@ def log_uniform(rng: Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def draw_plan(rng: Generator) -> Plan:
+def draw_plan(rng: Generator, seed: int) -> Plan:
     """Sample rate 200 Hz to 10 kHz, 6 to 60 s, 20 to 100 reversals, stroke 1 mm to 30 m (rad)."""
     rate = log_uniform(rng, 200.0, 10_000.0)
     duration = min(max(log_uniform(rng, 4000, 60_000) / rate, 6.0), 60.0)
@@ -89,13 +95,24 @@ def draw_plan(rng: Generator) -> Plan:
     first = names[rng.integers(len(names))]
     second = names[rng.integers(len(names))] if rng.random() < 0.5 else first
     stroke = log_uniform(rng, 1e-3, 30.0)
-    return Plan((first, second), rate, count, period, stroke * rng.uniform(-1, 0.5), stroke)
+    low = stroke * rng.uniform(-1, 0.5)
+    return _alike(Plan((first, second), rate, count, (period, period), low, stroke), seed)
+
+
+def _alike(plan: Plan, seed: int) -> Plan:
+    """The held-out motion slower or faster, so that both accelerate about as hard."""
+    first, second = (
+        float(np.quantile(np.abs(np.diff(reference(plan, seed, run)[1])), 0.9)) for run in (0, 1)
+    )
+    # A loop that follows a motion also follows one a quarter faster.
+    ratio = min(max(np.sqrt(second / first), 0.75), 1.5)
+    return plan._replace(periods=(plan.period, float(ratio * plan.period)))
 
 
 def reference(plan: Plan, seed: int, run: int):
     """Set-point of run 0 (identification) or 1 (held out): position m, velocity m/s, `(count,)`."""
     x, v = motions.motion(
-        plan.kinds[run], (seed, 3, run), 1 / plan.sample_rate, plan.samples, plan.period
+        plan.kinds[run], (seed, 3, run), 1 / plan.sample_rate, plan.samples, plan.periods[run]
     )
     return plan.low + plan.stroke * x, plan.stroke * v
 
