@@ -68,6 +68,16 @@ class Model(eqx.Module):
                 total = total + term.columns(motion) @ alpha + term.offset(motion)
         return jnp.reshape(total, velocity.shape)
 
+    def without(self, prefix: str) -> "Model":
+        """The model without the terms that read a signal whose name begins with `prefix`."""
+        parts = [
+            (term, alpha)
+            for term, alpha in zip(_summands(self.term), self._alphas(), strict=True)
+            if not any(name.startswith(prefix) for name in term.coordinates)
+        ]
+        terms, alphas = zip(*parts, strict=True)
+        return Model(Sum(terms), jnp.concatenate(alphas), self.units)
+
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """The model with some parameters replaced; raises `ValueError` for a name it lacks."""
         current = self.parameters

@@ -20,7 +20,7 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
     to break-away, the value is that of the terms at rest.
     """
-    prepared = signals.prepare(recording)
+    prepared = with_channels(model, signals.prepare(recording))
     traced = any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(prepared))
     reach = signals.TRACED_REACH if traced else signals.HALF_WIDTHS[-1]
     motion = prepared
@@ -34,6 +34,31 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     return model.force(prepared) + rate
 
 
+def with_channels(model: Model, recording: Recording) -> Recording:
+    """A prepared recording with the channels `predicted_…` that some terms of the model read.
+
+    Faults of the actuator act on the force f that the motion needs, which the terms without faults
+    predict: `predicted_force`, N; `predicted_friction`, the part of it that depends on velocity
+    alone, N; `predicted_jerk`, m/s³. Channels that are there already stay.
+    """
+    read = {name for name in model.term.coordinates if name.startswith("predicted_")}
+    if not read - set(recording.channels):
+        return recording
+    sound = model.without("predicted_")
+    span = signals.kernel_half_width(recording) * signals.interval(recording)
+    reach = signals.kernel_half_width(recording)
+
+    def rate(signal):
+        return signals.local_quadratic(recording, signal, span, reach)[1]
+
+    made = {
+        "predicted_force": sound.force(recording) + rate(sound.momentum(recording)),
+        "predicted_friction": sound.friction(recording.velocity),
+        "predicted_jerk": rate(rate(recording.velocity)),
+    }
+    return dataclasses.replace(recording, channels=made | recording.channels)
+
+
 def relative_error(
     model: Model, recording: Recording, half_width: int | None = None
 ) -> Float[Array, ""]:
@@ -42,7 +67,7 @@ def relative_error(
     The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.
     `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
     """
-    prepared = signals.prepare(recording)
+    prepared = with_channels(model, signals.prepare(recording))
     width = half_width or signals.kernel_half_width(prepared)
     return _relative_error(model, prepared, width)
 

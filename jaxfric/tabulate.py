@@ -200,3 +200,30 @@ def _remarks(parameters: Mapping[str, Any]) -> list[str]:
 
 def _bump(name: str) -> bool:
     return name.startswith("stribeck_force")
+
+
+def explanation(document: Mapping[str, Any]) -> str:
+    """An explanation (schema `jaxfric.explanation/1`) in words and tables."""
+    facts = document["recording"]
+    lines = [f"{facts['file']}: {facts['samples']} samples, {facts['duration']:.4g} s"]
+    lines += [f"  {note}" for note in facts.get("notes", [])]
+    lines += ["", f"baseline {document['baseline']['name']}", ""]
+    lines += _wrapped(f"{document['verdict']}: {document['summary']}")
+    for finding in document["findings"]:
+        lines += ["", finding["effect"], *(f"  {line}" for line in _wrapped(finding["sentence"]))]
+        if finding["confusable_with"] and finding["separate_by"]:
+            lines += [f"  {line}" for line in _wrapped(f"To tell: {finding['separate_by']}")]
+    if document["where"]:
+        rows = [["where the baseline errs", "share", "p", "detail"]]
+        for place in document["where"]:
+            name = place["coordinate"].replace("_", " ")
+            share, chance = f"{place['share']:.0%}", f"{place['p_value']:.3f}"
+            rows.append([name, share, chance, place["detail"]])
+        lines += ["", *_aligned(rows, (1, 2))]
+    if document["not_visible"]:
+        rows = [["not found, would have been seen from", "", ""]]
+        for entry in document["not_visible"]:
+            name = entry["effect"].replace("_", " ")
+            rows.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
+        lines += ["", *_aligned(rows, (1,))]
+    return "\n".join(lines)

@@ -100,7 +100,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for add in (_add_demo, _add_identify, _add_predict, _add_simulate, _add_models):
+    for add in (
+        _add_demo,
+        _add_identify,
+        _add_explain,
+        _add_predict,
+        _add_simulate,
+        _add_export,
+        _add_models,
+    ):
         add(commands)
     return parser
 
@@ -152,6 +160,40 @@ def _add_identify(commands) -> None:
     _add_reading(command)
 
 
+def _add_explain(commands) -> None:
+    command = _add(commands, "explain", "explain.run", "what a model leaves out of a recording")
+    command.add_argument("file", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    base = command.add_mutually_exclusive_group()
+    base.add_argument(
+        "--baseline",
+        default="gaussian",
+        metavar="NAME_OR_MODEL.json",
+        help="a name that jaxfric models lists, or a saved model (default: gaussian)",
+    )
+    base.add_argument(
+        "--simulation",
+        metavar="FILE",
+        help="instead: the same reference run through your own simulator, or its force for the "
+        "recorded motion",
+    )
+    command.add_argument("--holdout", metavar="FILE", help="a recording that is only judged on")
+    command.add_argument(
+        "--fixed",
+        action="store_true",
+        help="keep a saved model's parameters, unless they are found wrong, instead of refitting",
+    )
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the explanation; - prints it"
+    )
+    command.add_argument(
+        "--report", type=options.output, metavar="OUT.html", help="write a page (extra: report)"
+    )
+    command.add_argument(
+        "--save", type=options.output, metavar="MODEL.json", help="write the improved model"
+    )
+    _add_reading(command)
+
+
 def _add_predict(commands) -> None:
     command = _add(
         commands, "predict", "commands.predict", "the force that a recorded motion needs"
@@ -177,6 +219,31 @@ def _add_simulate(commands) -> None:
         "without one the force column drives",
     )
     _add_reading(command)
+
+
+def _add_export(commands) -> None:
+    command = _add(commands, "export", "export.run", "hand a model over to another program")
+    command.add_argument("model", metavar="MODEL.json")
+    command.add_argument(
+        "--to", required=True, choices=("c", "modelica", "mujoco", "urdf", "table"), help="target"
+    )
+    command.add_argument(
+        "-o", "--out", type=options.output, default="-", metavar="OUT", help="default: printed"
+    )
+    command.add_argument("--name", default="axis", help="of functions, block or joint")
+    command.add_argument(
+        "--speed",
+        type=options.span,
+        metavar="LOW:HIGH",
+        help="range that mujoco, urdf and table are fitted to and judged over "
+        "(default: from rest to where friction has doubled or its bump is over)",
+    )
+    command.add_argument(
+        "--position",
+        type=options.span,
+        metavar="LOW:HIGH",
+        help="likewise (default: a period of every wave)",
+    )
 
 
 def _add_models(commands) -> None:

@@ -55,6 +55,15 @@ def bounds(text: str) -> dict[str, tuple[float, float]]:
     return found
 
 
+def span(text: str) -> tuple[float, float]:
+    """`low:high` as a pair of numbers, the second the larger."""
+    low, colon, high = text.partition(":")
+    limits = (number(low), number(high)) if colon else (1.0, 0.0)
+    if not limits[0] < limits[1]:
+        raise ArgumentTypeError(f"{text!r} is not of the form LOW:HIGH")
+    return limits
+
+
 def controller(text: str) -> tuple[str, dict[str, float]]:
     """`kind:gain=value,…` as the kind and its gains, all of them given."""
     kind, _, rest = text.partition(":")

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
-from ..recording import Recording
+from ..recording import Recording, pad
 from ..terms.base import AbstractTerm, Scales
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
@@ -135,9 +135,13 @@ def gather(
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
-    prepared = signals.prepare(recording)
+    count = recording.num_samples
+    # The name and the number of segments would be compiled in.
+    nameless = dataclasses.replace(recording, source="", num_segments=1)
+    prepared = signals.prepare(pad(nameless, _octave(count)))
     width = half_width or signals.kernel_half_width(prepared)
     limits = Scales(*(float(x) for x in _scales(prepared)))
+    prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
     reach = step * NODES * limits.interval
     parts = _node_signals(prepared, limits, step, delay)
@@ -168,10 +172,15 @@ def gather(
 _scales = eqx.filter_jit(signals.scales)
 
 
+def _octave(count: int) -> int:
+    """The next power of two, so that recordings of any length share a few compiled programs."""
+    return max(256, 1 << (count - 1).bit_length())
+
+
 def _node_signals(recording: Recording, limits: Scales, step: int, delay: float) -> dict:
     """Local means of every signal, `step` samples apart, with the run that each node lies in."""
     time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
-    linked = np.asarray(signals.continuous(recording, jnp.asarray(limits.interval)))
+    linked = _continuous(time, mask, np.asarray(recording.segment), limits.interval)
     run = np.pad(np.cumsum(~linked), (1, 0))
     steps = np.where(linked, np.diff(time), limits.interval)
     series = {
@@ -198,6 +207,13 @@ def _node_signals(recording: Recording, limits: Scales, step: int, delay: float)
         for name, values in series.items()
     }
     return means | {"run": np.where(total > 0, run[centres], -1 - np.arange(len(centres)))}
+
+
+def _continuous(time, mask, segment, interval) -> np.ndarray:
+    """As [`continuous`][jaxfric.signals.continuous], on the host."""
+    steps = np.diff(time)
+    together = mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
+    return together & (steps > 0) & (steps <= signals.GAP_FACTOR * interval)
 
 
 def _shifted(time, force, run, delay):
@@ -230,10 +246,9 @@ def _windows(parts: dict, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _padded(parts: dict, recording: Recording) -> Recording:
-    """The nodes as a recording, lengthened to the next of four lengths an octave."""
+    """The nodes as a recording, lengthened as [`_octave`][] says."""
     count = len(parts["time"])
-    power = 2.0 ** np.floor(np.log2(max(count, 64)))
-    length = int(next(m for m in power * np.array([1, 1.25, 1.5, 1.75, 2]) if m >= count))
+    length = _octave(count)
 
     def pad(values):
         return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))
