@@ -32,7 +32,8 @@ class Evidence(NamedTuple):
 
     - `motion`: recording of the nodes, padded to one of few lengths, `(M,)`.
     - `nodes`: how many of them are real.
-    - `index`: the nodes of each row, `(J, K)`; `average` and `slope`: their weights, 1 and 1/s.
+    - `average` and `slope`: weights of the nodes around every third one, 1 and 1/s, `(R, K)`;
+      `rows`: which of these lie in slip, `(J,)`.
     - `target`: the force of each row, N, `(J,)`; `side`: its direction, ±1.
     - `centre`: the node in the middle of each row, `(J,)`.
     - `elapsed`: time since the start without interruptions, s, at the nodes, `(M,)`.
@@ -43,9 +44,9 @@ class Evidence(NamedTuple):
 
     motion: Recording
     nodes: int
-    index: np.ndarray
     average: np.ndarray
     slope: np.ndarray
+    rows: np.ndarray
     target: np.ndarray
     side: np.ndarray
     centre: np.ndarray
@@ -56,9 +57,9 @@ class Evidence(NamedTuple):
     clock: bool
 
     def project(self, plain: Any, momentum: Any = None) -> np.ndarray:
-        """Values at the nodes, `(..., M, p)`, as rows, `(..., J, p)`; `momentum` differentiated."""
-        rows = _weigh(np.asarray(plain), self.index, self.average)
-        return rows if momentum is None else rows + _weigh(momentum, self.index, self.slope)
+        """Values at the nodes, `(..., M)`, as rows, `(..., J)`; `momentum` is differentiated."""
+        rows = _weigh(np.asarray(plain), self.rows, self.average)
+        return rows if momentum is None else rows + _weigh(momentum, self.rows, self.slope)
 
     def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
         """Rows of a term's columns at many β, `(G, d)` to `(G, J, p)`."""
@@ -71,7 +72,7 @@ class Evidence(NamedTuple):
             plain, momentum = evaluate(term, jnp.asarray(full), self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
-        return np.concatenate(parts)
+        return np.concatenate(parts).transpose(0, 2, 1)
 
     def with_channels(self, **channels: np.ndarray) -> "Evidence":
         """The same with more signals at the nodes, each `(M,)`."""
@@ -80,15 +81,17 @@ class Evidence(NamedTuple):
         return self._replace(motion=motion)
 
 
-def _weigh(values: np.ndarray, index: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    total = 0.0
-    for k in range(index.shape[1]):
-        total = total + weights[:, k, None] * values[..., index[:, k], :]
-    return np.asarray(total)
+def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Weighted sums of the nodes around every third one, of which `rows` are kept."""
+    count = len(weights)
+    total = np.zeros((*values.shape[:-1], count))
+    for k in range(weights.shape[1]):
+        total += weights[:, k] * values[..., k : k + STRIDE * count : STRIDE][..., :count]
+    return total[..., rows]
 
 
 def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
-    """Columns, `(BATCH, M, p)`, and momentum, `None` where there is none, at `BATCH` β.
+    """Columns, `(BATCH, p, M)`, and momentum, `None` where there is none, at `BATCH` β.
 
     Compiled once for each kind of term; but a term with numbers of the recording built into its
     structure (the middle of the stroke, say) would be compiled for every recording anew.
@@ -99,7 +102,7 @@ def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
 def _columns(term, betas, motion):
     def one(beta):
         known = term.with_beta(beta)
-        return known.columns(motion), known.momentum(motion) if term.inertial else None
+        return known.columns(motion).T, known.momentum(motion).T if term.inertial else None
 
     if term.nonlinear:
         return jax.vmap(one)(betas)
@@ -145,28 +148,38 @@ def gather(
     step = max(1, round(width / NODES))
     reach = step * NODES * limits.interval
     parts = _node_signals(prepared, limits, step, delay)
-    index, average, slope = _windows(parts, reach)
+    index, whole, average, slope = _windows(parts, reach)
     speed = parts["velocity"][index]
     moving = np.abs(speed) > limits.slowest
     one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
     slips = np.sum(average * moving, axis=1) > 0.5 if reversals else moving.all(axis=1) & one_way
-    index, average, slope = index[slips], average[slips], slope[slips]
-    if len(index) < 32:
+    rows = np.flatnonzero(whole & slips)
+    if len(rows) < 32:
         raise ValueError(
-            f"{recording.source or 'The recording'} leaves {len(index)} independent stretches in "
+            f"{recording.source or 'The recording'} leaves {len(rows)} independent stretches in "
             "which the axis slips; at least 32 are needed to tell structure from chance. Record "
             "longer, or move more."
         )
-    count = len(parts["time"])
     motion = _padded(parts, prepared)
-    centre = index[:, NODES]
-    target = np.sum(average * parts["force"][index], axis=1)
-    elapsed = np.pad(parts["elapsed"], (0, motion.num_samples - count), mode="edge")
+    centre = index[rows, NODES]
+    target = np.sum(average * parts["force"][index], axis=1)[rows]
+    pads = motion.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
     return Evidence(
-        motion, count, index, average, slope, target, np.sign(parts["velocity"][centre]), centre,
-        elapsed, limits, reach, step * NODES, bool(np.all(np.diff(time) > 0)),
-    )  # fmt: skip
+        motion=motion,
+        nodes=len(parts["time"]),
+        average=average,
+        slope=slope,
+        rows=rows,
+        target=target,
+        side=np.sign(parts["velocity"][centre]),
+        centre=centre,
+        elapsed=np.pad(parts["elapsed"], (0, pads), mode="edge"),
+        limits=limits,
+        reach=reach,
+        width=step * NODES,
+        clock=bool(np.all(np.diff(time) > 0)),
+    )
 
 
 _scales = eqx.filter_jit(signals.scales)
@@ -228,21 +241,21 @@ def _shifted(time, force, run, delay):
     return out
 
 
-def _windows(parts: dict, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes and weights of every row that lies within one run of the record."""
-    count = len(parts["time"])
-    middle = np.arange(NODES, count - NODES, STRIDE)
+def _windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
+    """Nodes of the row around every third node, whether they lie in one run, and their weights."""
+    middle = np.arange(NODES, len(parts["time"]) - NODES, STRIDE)
     index = middle[:, None] + np.arange(-NODES, NODES + 1)[None, :]
     whole = parts["run"][index[:, 0]] == parts["run"][index[:, -1]]
-    index = index[whole]
+    even = np.arange(-NODES, NODES + 1) * reach / NODES
     offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
+    offset = np.where(whole[:, None], offset, even[None, :])
     tau = offset / reach
     average = np.maximum(1 - tau**2, 0.0) ** 4
     slope = 8 * tau * np.maximum(1 - tau**2, 0.0) ** 3
     average /= average.sum(axis=1, keepdims=True)
     slope -= average * slope.sum(axis=1, keepdims=True)
     slope /= np.sum(slope * offset, axis=1, keepdims=True)
-    return index, average, slope
+    return index, whole, average, slope
 
 
 def _padded(parts: dict, recording: Recording) -> Recording:

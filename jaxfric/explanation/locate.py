@@ -151,11 +151,11 @@ def _knots(name: str, values: np.ndarray) -> np.ndarray:
 def _hats(evidence, value, factor, kind, knots) -> np.ndarray:
     """The curve's hats as rows, `(J, K)`."""
     if kind == "rate":
-        return evidence.project(np.zeros((len(value), 1)), value[:, None])
+        return evidence.project(np.zeros((1, len(value))), value[None, :]).T
     place = np.interp(value, knots, np.arange(len(knots)))
     hats = np.maximum(1 - np.abs(place[:, None] - np.arange(len(knots))[None, :]), 0.0)
     if kind == "plain":
-        return evidence.project(factor[:, None] * hats)
+        return evidence.project((factor[:, None] * hats).T).T
     # Lagrange: d(M₁ v)/dt − ½ M₁′ v².
     cell = np.clip(np.floor(place).astype(int), 0, len(knots) - 2)
     inside = (value > knots[0]) & (value < knots[-1])
@@ -163,4 +163,5 @@ def _hats(evidence, value, factor, kind, knots) -> np.ndarray:
     slopes = np.zeros_like(hats)
     rows = np.arange(len(value))
     slopes[rows, cell], slopes[rows, cell + 1] = -rate, rate
-    return evidence.project(-0.5 * (factor**2)[:, None] * slopes, factor[:, None] * hats)
+    plain = -0.5 * (factor**2)[:, None] * slopes
+    return evidence.project(plain.T, (factor[:, None] * hats).T).T

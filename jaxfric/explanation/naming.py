@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..terms import DisturbancePulses
 from ..terms.base import AbstractTerm
 from .candidates import Candidate, Field, scaled
 from .chance import DRAWS, Judge, adjusted, blocks, thresholds
@@ -89,7 +90,8 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
             zip(field.candidates, scans, p_values, least, strict=True)
         )
     ]
-    for candidate in pulses(seen, now):
+    known = any(isinstance(term, DisturbancePulses) for term in now.terms)
+    for candidate in [] if known else pulses(seen, now):
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events: what stands out has been tested.
         trials.append(_trial(judge, candidate, raw, judge(raw), 1 / (1 + DRAWS), np.inf))

@@ -24,11 +24,11 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
             term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
         )
         if isinstance(term, Sum) or term.coordinates <= {"velocity"}:
-            friction = friction + np.asarray(plain[0]) @ alpha
+            friction = friction + alpha @ np.asarray(plain[0])
         else:
-            other = other + np.asarray(plain[0]) @ alpha
+            other = other + alpha @ np.asarray(plain[0])
         if moving is not None:
-            momentum = momentum + np.asarray(moving[0]) @ alpha
+            momentum = momentum + alpha @ np.asarray(moving[0])
     acceleration = rate(evidence, np.asarray(evidence.motion.velocity))
     return evidence.with_channels(
         predicted_force=friction + other + rate(evidence, momentum),

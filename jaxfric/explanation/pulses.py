@@ -25,35 +25,49 @@ def pulses(evidence: Evidence, now: Fit) -> list[Candidate]:
         return []
     time = np.asarray(evidence.motion.time)[evidence.centre]
     spacing = 0.5 * evidence.reach
-    widths = spacing * np.geomspace(3.0, max(4.0, 0.02 * len(time)), 8)
+    widths = spacing * np.geomspace(2.0, max(4.0, 0.02 * len(time)), 14)
     best, found = 0.0, None
     for width in widths:
-        places, weight = _outstanding(now.residual, time, width, spacing)
-        covered = 2 * width * len(places)
-        if len(places) and covered <= LARGEST_PART * (time[-1] - time[0]) and weight > best:
-            best, found = weight, (places, width)
-    if found is None:
-        return []
-    term = laws.DisturbancePulses(tuple(found[0]), float(found[1]))
-    return [Candidate(EFFECTS["disturbance_pulses"], term, np.zeros((1, 0)))]
+        places = _outstanding(now.residual, time, width, spacing)
+        if not places or 2 * width * len(places) > LARGEST_PART * (time[-1] - time[0]):
+            continue
+        candidate = Candidate(
+            EFFECTS["disturbance_pulses"],
+            laws.DisturbancePulses(tuple(places), float(width)),
+            np.zeros((1, 0)),
+        )
+        columns = candidate.columns(evidence)[0]
+        gain = now.residual @ columns @ np.linalg.lstsq(columns, now.residual, rcond=1e-9)[0]
+        if gain > best:
+            best, found = gain, candidate
+    return [] if found is None else [found]
 
 
-def _outstanding(residual, time, width, spacing) -> tuple[list[float], float]:
-    """Times of the pushes of one width, and how much they stand out together."""
+def _outstanding(residual, time, width, spacing) -> list[float]:
+    """Times of the pushes of one width, between the rows where their peak lies."""
     reach = int(np.ceil(width / spacing))
     shape = (
         np.cos(0.5 * np.pi * np.clip(np.arange(-reach, reach + 1) * spacing / width, -1, 1)) ** 2
     )
     if 2 * len(shape) > len(residual):
-        return [], 0.0
+        return []
     height = np.convolve(residual, shape / np.sqrt(shape @ shape), "same")
     spread = np.median(np.abs(height)) / 0.6745
-    size = np.abs(height) / max(spread, 1e-300)
-    places, left = [], size.copy()
-    for _ in range(MOST + 1):
+    left, places = np.abs(height) / max(spread, 1e-300), []
+    for _ in range(MOST):
         peak = int(np.argmax(left))
         if left[peak] < OUTSTANDING:
-            return [float(time[i]) for i in sorted(places)], float(np.sum(size[places] ** 2))
-        places.append(peak)
+            return sorted(places)
+        places.append(_summit(time, left, peak))
         left[max(0, peak - 2 * reach) : peak + 2 * reach + 1] = 0.0
-    return [], 0.0
+    return [] if np.max(left) >= OUTSTANDING else sorted(places)
+
+
+def _summit(time, height, peak) -> float:
+    """Where the parabola through a peak and its neighbours is highest, s."""
+    if not 0 < peak < len(height) - 1:
+        return float(time[peak])
+    before, at, after = height[peak - 1 : peak + 2]
+    bend = before - 2 * at + after
+    share = 0.5 * (before - after) / bend if bend < 0 else 0.0
+    return float(time[peak] + share * 0.5 * (time[peak + 1] - time[peak - 1]))
