@@ -1,0 +1,46 @@
+"""`jaxfric export`: a model for another program."""
+
+import sys
+from argparse import Namespace
+
+from ..export import Exported, export
+from ..models import Model
+from ..units import VELOCITY, spell
+from .commands import _load, put
+
+
+def run(arguments: Namespace) -> int:
+    """Write the model's text, and say what its form costs."""
+    model = _load(arguments.model)
+    try:
+        found = export(
+            model,
+            arguments.to,
+            name=arguments.name,
+            speed=arguments.speed,
+            position=arguments.position,
+        )
+    except ValueError as error:
+        raise ValueError(f"{arguments.model}: {error}") from error
+    put(arguments.out, found.text)
+    alone = arguments.out == "-"
+    head = "" if alone else f"{arguments.out}: "
+    print(f"{head}{summary(found, model, arguments.to)}", file=sys.stderr if alone else sys.stdout)
+    return 0
+
+
+def summary(found: Exported, model: Model, target: str) -> str:
+    """The cost in a few lines."""
+    lines = [f"{target}, force error {_cost(found, model)}"]
+    lines += [f"  left out: {entry}" for entry in found.left_out]
+    lines += [f"  {remark}" for remark in found.remarks]
+    return "\n".join(lines)
+
+
+def _cost(found: Exported, model: Model) -> str:
+    rms, relative, worst, unit = found.force_error
+    if found.speed is None:
+        return "none but rounding"
+    low, high = found.speed
+    speeds = f"{low:.4g} to {high:.4g} {spell(VELOCITY, dict(model.units))}"
+    return f"{relative:.2%} ({rms:.3g} {unit} rms, {worst:.3g} {unit} at most) over {speeds}"

@@ -1,0 +1,111 @@
+"""C99: one function for the friction, one for the whole force, the parameters as constants."""
+
+import re
+from itertools import groupby
+
+from ..models import Model
+from .outcome import Exported, ForceError
+from .parts import Line, Part, constants, lines, parts, refuse
+from .syntax import C, identifier, literal
+
+_KEYWORDS = set(
+    "auto break case char const continue default do double else enum extern float for goto if "
+    "inline int long register restrict return short signed sizeof static struct switch typedef "
+    "union unsigned void volatile while".split()
+)
+
+
+def export(model: Model, name: str = "axis") -> Exported:
+    """A self-contained C99 text with `NAME_friction` and `NAME_force`; exact.
+
+    **Raises:** `ValueError` for a name that is none in C, and for terms with memory or channels.
+    """
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _KEYWORDS:
+        raise ValueError(f"{name!r} cannot begin a name in C: use letters, digits and _ (--name).")
+    every = parts(model)
+    able = ["modelica"] if all(part.remembered for part in every if not part.sampled) else []
+    refuse([part for part in every if not part.sampled], "c", able)
+    slip = [part for part in every if part.slips]
+    rest = [part for part in every if not part.slips]
+    text = "\n".join(
+        (
+            _head(model, name),
+            _constants(model),
+            C.helpers["sign_of"],
+            _friction(model, name, slip),
+            _force(model, name, rest),
+        )
+    )
+    unit = dict(model.units)["force"]
+    return Exported(text, ForceError(0.0, 0.0, 0.0, unit))
+
+
+def _head(model: Model, name: str) -> str:
+    force, position = (_comment(dict(model.units)[key]) for key in ("force", "position"))
+    return f"""/* {name}: the force of an axis, identified by jaxfric.
+ *
+ * C99, no state, no allocation. Units: {force} (force), {position} (position), s (time).
+ *
+ * double {name}_friction(double velocity);
+ * double {name}_force(double position, double velocity, double acceleration, double time);
+ */
+#include <math.h>
+"""
+
+
+def _comment(unit: str) -> str:
+    """A unit's name as it can stand in a comment."""
+    return " ".join(unit.replace("*/", "* /").replace("/*", "/ *").split())
+
+
+def _constants(model: Model) -> str:
+    rows = [
+        f"static const double {identifier(name)} = {literal(value)};"
+        f" /* {name}, {_comment(unit)} */\n"
+        for name, value, unit in constants(model)
+    ]
+    return "".join(rows)
+
+
+def _friction(model: Model, name: str, slip: list[Part]) -> str:
+    unit = _comment(dict(model.units)["force"])
+    return f"""/* Friction in slip, {unit}. At velocity 0, the constant terms alone. */
+double {name}_friction(double velocity)
+{{
+    const double v = velocity;
+    double u = 0.0;
+
+{_body(slip)}    (void)v;
+    return u;
+}}
+"""
+
+
+def _force(model: Model, name: str, rest: list[Part]) -> str:
+    unit = _comment(dict(model.units)["force"])
+    return f"""/* The force that a motion needs, {unit}: friction and all the other terms. */
+double {name}_force(double position, double velocity, double acceleration, double time)
+{{
+    const double x = position, v = velocity, a = acceleration, t = time;
+    double u = {name}_friction(velocity);
+
+{_body(rest)}    (void)x, (void)v, (void)a, (void)t;
+    return u;
+}}
+"""
+
+
+def _body(some: list[Part]) -> str:
+    return "".join(f"    /* {part.name} */\n{_statements(lines(C, part))}" for part in some)
+
+
+def _statements(products: tuple[Line, ...]) -> str:
+    text = ""
+    for side, group in groupby(products, lambda line: line.side):
+        sums = [f"u += {identifier(line.parameter)} * {line.column};\n" for line in group]
+        if side:
+            inner = "".join(f"        {row}" for row in sums)
+            text += f"    if (v {'>' if side == '+' else '<'} 0.0) {{\n{inner}    }}\n"
+        else:
+            text += "".join(f"    {row}" for row in sums)
+    return text

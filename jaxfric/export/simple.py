@@ -1,0 +1,118 @@
+"""A joint with dry friction, damping and (for some) a spring: what simulators of robots know."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import terms as laws
+from ..models import Model
+from ..units import is_rotary
+from . import cost
+from .cost import Range
+from .outcome import ForceError
+from .parts import SAMPLED, Part, parts
+
+
+class Joint(NamedTuple):
+    """The joint nearest to a model.
+
+    `friction` F, `damping` D: F sign(v) + D v. `inertia` M. `stiffness` k and `rest` x₀ of a
+    spring k (x − x₀), zero where the target has none. In the units of the model.
+    """
+
+    friction: float
+    damping: float
+    inertia: float
+    stiffness: float
+    rest: float
+    rotary: bool
+    force_error: ForceError
+    left_out: tuple[str, ...]
+    remarks: tuple[str, ...]
+    speed: Range
+
+
+def joint(
+    model: Model, speed: Range | None = None, position: Range | None = None, spring: bool = False
+) -> Joint:
+    """Fit the joint to the model's slip friction and count what it lacks.
+
+    **Arguments:** `speed`, `position`: the ranges to fit and count over (default: those of the
+    model, [`cost.speed_range`][] and [`cost.natural`][]); `spring`, whether the target has one.
+    """
+    known = cost.ranges(model, speed, position)
+    where = cost.motion(known)
+    counted = cost.forces(model, known, where)
+    velocity = np.asarray(where.recording.velocity, float)
+    slips = [counted[part.key] for part in parts(model) if part.slips]
+    slip = sum(slips, np.zeros_like(velocity))
+    level, slope = cost.fit(velocity, slip, where.weight)
+    stiffness, rest, sprung = _spring(model, spring)
+    given = level * np.sign(velocity) + slope * velocity
+    given += sum(
+        (counted[part.key] for part in sprung if part.key in counted), np.zeros_like(velocity)
+    )
+    wanted = sum(counted.values(), np.zeros_like(velocity))
+    missing = _missing(model, sprung)
+    bursts = sum(cost.burst(model, part) for part in missing)
+    unit = dict(model.units)["force"]
+    return Joint(
+        level,
+        slope,
+        sum(_inertia(model)),
+        stiffness,
+        rest,
+        is_rotary(dict(model.units)),
+        cost.error(where, wanted, given, unit, bursts),
+        tuple(_told(model, part, counted, where, unit) for part in missing),
+        _units(model),
+        known["velocity"],
+    )
+
+
+def _inertia(model: Model) -> list[float]:
+    held = [part for part in parts(model) if isinstance(part.law, laws.Inertia)]
+    return [float(model.parameters[part.affine[0]]) for part in held]
+
+
+def _spring(model: Model, wanted: bool) -> tuple[float, float, list[Part]]:
+    """Stiffness, rest and parts of the spring; none where it pushes away, which no joint holds."""
+    for part in parts(model):
+        if wanted and isinstance(part.term, laws.Spring):
+            stiffness = float(model.parameters[part.affine[0]])
+            if stiffness > 0:
+                return stiffness, part.term.rest, [part]
+    return 0.0, 0.0, []
+
+
+def _missing(model: Model, sprung: list[Part]) -> list[Part]:
+    held = {part.key for part in sprung}
+    taken = (laws.Coulomb, laws.Viscous, laws.Inertia)
+    return [p for p in parts(model) if not isinstance(p.law, taken) and p.key not in held]
+
+
+def _told(model: Model, part: Part, counted, where: cost.Motion, unit: str) -> str:
+    """One part that the joint lacks, with its size."""
+    if part.key in counted:
+        force = counted[part.key]
+        size = f"{where.rms(force):.3g} {unit} rms, {np.max(np.abs(force)):.3g} {unit} at most"
+        taken_up = part.slips and not isinstance(part.law, laws.Offset)
+        return f"{part.name}: {size}" + ", before the fit takes up what it can" * taken_up
+    if burst := cost.burst(model, part):
+        return f"{part.name}: up to {burst:.3g} {unit} around a reversal, in the worst case only"
+    if channels := sorted(part.term.coordinates - SAMPLED):
+        return f"{part.name}: not counted, for it depends on {', '.join(channels)}"
+    if "acceleration" in part.term.coordinates:
+        return f"{part.name}: not counted, for it depends on acceleration"
+    return f"{part.name}: not counted without the range of the position (--position LOW:HIGH)"
+
+
+def _units(model: Model) -> tuple[str, ...]:
+    units = dict(model.units)
+    si = ("N·m", "N*m", "Nm") if is_rotary(units) else ("N",)
+    if units["force"] in si and units["position"] in ("m", "rad"):
+        return ()
+    return (
+        f"Numbers are in {units['force']}, {units['position']} and s, as in the model; the target "
+        "expects SI units: identify with --scale and --units to have them.",
+    )

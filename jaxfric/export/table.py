@@ -1,0 +1,119 @@
+"""CSV: friction over velocity, and every further term over its coordinate."""
+
+import csv
+from collections.abc import Mapping
+from io import StringIO
+
+import jax.numpy as jnp
+import numpy as np
+
+from .. import terms as laws
+from ..models import Model
+from ..recording import Recording
+from ..units import VELOCITY, spell
+from . import cost
+from .cost import Range
+from .outcome import Exported, ForceError
+from .parts import Part, parts, refuse
+
+# A Gaussian bump at a fifth of the top speed (the default range) is drawn to 1e-3 of its height.
+POINTS = 201
+
+
+def export(
+    model: Model,
+    name: str = "axis",
+    speed: Range | None = None,
+    position: Range | None = None,
+    points: int = POINTS,
+) -> Exported:
+    """A table of friction over both directions of velocity, and of the other terms beside it.
+
+    Each coordinate has a column of its own, spaced evenly over its range. A term that depends on
+    place and direction is given for positive velocity: it changes its sign with the direction.
+    `force_error` is that of straight lines between the points of friction.
+
+    **Raises:** `ValueError` for a term that is no function of one coordinate, or whose range is
+    not known.
+    """
+    every = [part for part in parts(model) if not isinstance(part.law, laws.Inertia)]
+    further = [part for part in every if not part.slips]
+    refuse([p for p in further if not p.sampled], "table", [])
+    refuse([p for p in further if _coordinate(p) is None], "table", ["c and modelica"])
+    known = cost.ranges(model, speed, position)
+    columns, force_error = _friction(model, known["velocity"], points)
+    for part in further:
+        columns |= _beside(model, part, known, points)
+    remark = [] if len(every) == len(parts(model)) else ["Inertia is no table: see the model."]
+    odd = [part.name for part in further if _odd(part)]
+    if odd:
+        remark.append(f"{', '.join(odd)}: for positive velocity; negative velocity turns the sign.")
+    return Exported(_csv(columns), force_error, (), tuple(remark), known["velocity"])
+
+
+def _odd(part: Part) -> bool:
+    """Whether a term is a function of place times the sign of velocity."""
+    return isinstance(part.term, laws.PositionDependentFriction | laws.StickySpot)
+
+
+def _coordinate(part: Part) -> str | None:
+    """The one coordinate of a term, or `None` where there are more."""
+    if _odd(part):
+        return "position"
+    names = set(part.term.coordinates)
+    return names.pop() if len(names) == 1 else None
+
+
+def _friction(model: Model, span: Range, points: int) -> tuple[dict[str, np.ndarray], ForceError]:
+    """Velocity and friction, and the error of the straight lines between the points."""
+    low, high = span
+    # The curve jumps at zero: the innermost points lie on either side of it.
+    inner = low if low > 0 else 1e-6 * high
+    speeds = np.linspace(inner, high, points)
+    velocity = np.concatenate([-speeds[::-1], speeds])
+    curve = np.asarray(model.friction(jnp.asarray(velocity)), float)
+    where = cost.motion({"velocity": span})
+    wanted = np.asarray(model.friction(where.recording.velocity), float)
+    given = _between(np.asarray(where.recording.velocity, float), velocity, curve)
+    unit = dict(model.units)["force"]
+    columns = {f"velocity [{spell(VELOCITY, dict(model.units))}]": velocity}
+    return columns | {f"friction [{unit}]": curve}, cost.error(where, wanted, given, unit)
+
+
+def _between(velocity: np.ndarray, knots: np.ndarray, curve: np.ndarray) -> np.ndarray:
+    """Straight lines between the knots of each direction, `(N,)`; none leads across zero."""
+    up = knots > 0
+    forwards = np.interp(velocity, knots[up], curve[up])
+    backwards = np.interp(velocity, knots[~up], curve[~up])
+    return np.where(velocity > 0, forwards, backwards)
+
+
+def _beside(
+    model: Model, part: Part, known: Mapping[str, Range], points: int
+) -> dict[str, np.ndarray]:
+    """The columns of one further term; the coordinate's is the same for all that share it."""
+    coordinate, units = _coordinate(part), dict(model.units)
+    if coordinate not in known:
+        raise ValueError(
+            f"The model does not say over which {coordinate} {part.name} is to be tabulated: give "
+            "the range, for instance --position 0:0.4."
+        )
+    # As many rows as the friction has.
+    at = np.linspace(*known[coordinate], 2 * points)
+    rest = jnp.zeros(at.size)
+    signals = {"time": rest, "position": rest, coordinate: jnp.asarray(at)}
+    motion = Recording(force=rest, velocity=jnp.ones_like(rest), **signals)
+    force = np.asarray(part.term.columns(motion) @ cost.alpha(model, part), float)
+    unit = units["position"] if coordinate == "position" else "s"
+    label = (
+        f"{part.name} {' '.join(part.affine[:1])}" if part.affine[0][-1].isdigit() else part.name
+    )
+    return {f"{coordinate} [{unit}]": at, f"{label} [{units['force']}]": force}
+
+
+def _csv(columns: Mapping[str, np.ndarray]) -> str:
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(array.tolist() for array in columns.values()), strict=True))
+    return text.getvalue()
