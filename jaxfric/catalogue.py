@@ -10,9 +10,9 @@ from typing import NamedTuple
 from . import terms as laws
 from .terms.base import AbstractTerm, Scales
 
-# A step in friction cannot be dated better than to about one kernel of the weak form; a hundredth
-# of the record is near it and is the spacing of the default grid over the step's time.
-RAMP_SHARE = 0.01
+# A step in friction cannot be dated better than to about one kernel of the weak form, some
+# thousandths of the record.
+RAMP_SHARE = 0.005
 
 
 class Effect(NamedTuple):

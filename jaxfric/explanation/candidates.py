@@ -162,7 +162,8 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     count = len(term.nonlinear)
     if not count:
         return np.zeros((1, 0))
-    fine = 2 * GRID if isinstance(term, laws.FrictionStep) else GRID
+    # A step is told to within its ramp only.
+    fine = 8 * GRID if isinstance(term, laws.FrictionStep) else GRID
     along = (np.arange(fine) + 0.5) / fine
     return space.beta(np.repeat(along[:, None], count, axis=1))
 

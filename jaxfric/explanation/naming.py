@@ -114,12 +114,13 @@ def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
 
 def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
     done, basis = [], now.basis()
+    bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     enough = 0.5 * trials[0].score(trials[0].gain, size) - RIVAL
     for number, trial in enumerate(trials):
         found = None
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
             found = _refined(seen, now, trial, basis)
-        if _imitated(trial, now):
+        if bent and _imitated(trial, now):
             again = _afresh(seen, now, trial)
             found = again if found is None or again.energy < found.energy else found
         if found is None or (trial.candidate.effect.positive and np.any(found.alpha < 0)):
@@ -138,9 +139,12 @@ def _refined(seen, now, trial, basis) -> Finalist:
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
 
 
+_SPEED = frozenset({"velocity"})
+
+
 def _imitated(trial: Trial, now: Fit) -> bool:
     """Whether the base may have bent its own curve in velocity to what the candidate is."""
-    velocity = trial.candidate.term.coordinates <= {"velocity"} and len(trial.beta) < 2
+    velocity = trial.candidate.term.coordinates <= _SPEED and len(trial.beta) < 2
     return velocity and bool(now.terms[0].nonlinear)
 
 

@@ -45,20 +45,21 @@ def ask(
     motion = _from_position(recording)
     evidence = gather(motion)
     wide, delay, sample = _wider(motion, evidence.width), 0.0, evidence.limits.interval
+    known = fit([structure], evidence) if known is None else known
     # To first order a delay is a column; the first estimate is good to a fifth of a sample.
     for _ in range(3):
-        late = _lateness([evidence] if wide is None else [evidence, wide], structure, known)
-        step, delay = delay, delay - late
+        before = delay
+        delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
         if abs(delay) > sample:
             delay = -0.5 * sample
         evidence = gather(motion, evidence.width, delay)
         wide = None if wide is None else gather(motion, wide.width, delay)
-        if abs(delay - step) < 0.5 * ALIGNED * sample:
+        if abs(delay - before) < 0.5 * ALIGNED * sample:
             break
     held = None
     if holdout is not None:
         held = gather(_from_position(holdout), evidence.width, delay)
-    base = fit([structure], evidence)
+    base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     return Question(evidence, wide, held, base, block, structure, delay)
 
@@ -77,7 +78,7 @@ def _from_position(recording: Recording) -> Recording:
     return dataclasses.replace(recording, velocity=None)
 
 
-def _lateness(views: list[Evidence], structure: AbstractTerm, known: Fit | None) -> float:
+def _lateness(views: list[Evidence], known: Fit) -> float:
     """How much earlier the force is than belongs to the same instant as the position, s.
 
     A force that is held from sample to sample acts half a sample late, a controller that needs the
@@ -86,15 +87,13 @@ def _lateness(views: list[Evidence], structure: AbstractTerm, known: Fit | None)
     two differ, since noise of the encoder moves the narrow one only.
     """
     sample, delays = views[0].limits.interval, []
-    terms, betas = [structure], None
-    if known is not None:
-        kept = [i for i, term in enumerate(known.terms) if type(term) not in _SHARP_TERMS]
-        terms, betas = [known.terms[i] for i in kept], [known.betas[i] for i in kept]
+    kept = [i for i, term in enumerate(known.terms) if type(term) not in _SHARP_TERMS]
+    terms, betas = [known.terms[i] for i in kept], [known.betas[i] for i in kept]
     for evidence in views:
-        seen = evidence if known is None else with_predictions(evidence, known)
-        now = fit(terms, seen, betas)
+        seen = with_predictions(evidence, known)
+        now = fit(terms, seen, betas, 6)
         seen = with_predictions(seen, now)
-        both = fit([*terms, laws.TransportDelay()], seen, [*now.betas, None])
+        both = fit([*terms, laws.TransportDelay()], seen, [*now.betas, np.zeros(0)], 6)
         delays.append(float(both.alphas[-1][0]))
     return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
 

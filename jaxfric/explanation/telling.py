@@ -92,8 +92,9 @@ def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) ->
     return [place for place in places if sure or place.coordinate != "force_rate"]
 
 
-# A residual of four times the power of its own fast part is no noise, though nothing says where.
-ROUGH = 2.0
+# Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
+# part; of four times its size, sixteen times the power, something is missing, wherever.
+ROUGH = 4.0
 
 
 def _rough(found: Named, asked: Question) -> bool:

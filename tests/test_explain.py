@@ -1,0 +1,166 @@
+"""Explaining: nothing where nothing is missing, the planted effect where one is, in any unit."""
+
+import dataclasses
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import PD, Encoder, Recording, models, simulate, terms
+from jaxfric.explanation import explain
+
+TIME = np.arange(16384) / 1000.0
+COULOMB = 20.0
+PARAMETERS = {"inertia": 5.0} | {
+    f"{name}{sign}": value * (1.1 if sign == "+" else 0.9)
+    for sign in "+-"
+    for name, value in {
+        "coulomb": COULOMB,
+        "viscous": 60.0,
+        "stribeck_force": 6.0,
+        "stribeck_velocity": 0.01,
+    }.items()
+}
+
+
+def set_point(seed):
+    """Some sine waves, up to 0.3 m/s, over about 0.15 m."""
+    draw = np.random.default_rng(seed)
+    rates = 2 * np.pi * 0.7 * (1 + draw.uniform(0, 2.5, 5))
+    phases = draw.uniform(0, 2 * np.pi, 5)
+    x = sum(np.sin(w * TIME + p) / w for w, p in zip(rates, phases, strict=True))
+    v = sum(np.cos(w * TIME + p) for w, p in zip(rates, phases, strict=True))
+    scale = 0.3 / np.quantile(np.abs(v), 0.98)
+    return x * scale, v * scale
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    """Two recordings of one healthy machine in closed loop, with encoder and noise."""
+    machine = models.from_parameters(models.gaussian(), PARAMETERS)
+    loop = PD(kp=5.0 * 60**2, kd=2 * 5.0 * 60)
+    runs = []
+    for seed in (0, 1):
+        x, v = set_point(seed)
+        channels = {"reference": jnp.asarray(x), "reference_velocity": jnp.asarray(v)}
+        clock = Recording(TIME, np.zeros_like(TIME), x, v, channels=channels)
+        run = simulate(
+            machine, clock, loop, encoder=Encoder(resolution=1e-6), force_noise=0.2,
+            key=jax.random.key(seed), substeps=8,
+        )  # fmt: skip
+        runs.append(dataclasses.replace(run, channels={}, source=f"run {seed}"))
+    return runs
+
+
+def planted(recording, term, alpha, beta=()):
+    """The recording of a machine with that physics at the same motion."""
+    known = term.with_beta(jnp.asarray(beta)) if beta else term
+    x = np.asarray(recording.position)
+    v = np.gradient(x, TIME)
+    smooth = np.convolve(v, np.hanning(41) / np.hanning(41).sum(), "same")
+    motion = dataclasses.replace(recording, velocity=jnp.asarray(smooth))
+    force = np.asarray(known.columns(motion)) @ np.asarray(alpha)
+    return dataclasses.replace(recording, force=recording.force + force)
+
+
+CASES = {
+    "cogging": (terms.Cogging(), (2.0, 1.0), (0.01,)),
+    "spring": (terms.Spring(), (60.0,), ()),
+    "sticky_spot": (terms.StickySpot(), (6.0,), (0.02, 0.005)),
+    "friction_step": (terms.FrictionStep(), (3.0,), (9.0,)),
+    "periodic_disturbance": (terms.PeriodicDisturbance(), (2.0, -1.0), (6.3,)),
+}
+
+
+def test_nothing_is_missing_where_nothing_is(healthy):
+    found = explain(healthy[0], "gaussian", healthy[1])
+    assert found.verdict == "consistent"
+    assert found.findings == []
+    errors = found.fit["force_error"]
+    assert errors["before"] == errors["after"] < 0.02
+    # What was not found is listed, with a size between the noise and the Coulomb level.
+    sizes = {entry["effect"]: entry["smallest_detectable"] for entry in found.not_visible}
+    assert 0 < sizes["cogging"] < 0.1 * COULOMB
+
+
+@pytest.mark.parametrize("effect", CASES)
+def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
+    term, alpha, beta = CASES[effect]
+    run, held = (planted(r, term, alpha, beta) for r in healthy)
+    found = explain(run, "gaussian", held)
+    assert [f.effect for f in found.findings] == [effect]
+    finding = found.findings[0]
+    assert finding.share > 0.5 and finding.p_value <= 0.01
+    names = [p.name for p in (*term.affine, *term.nonlinear)]
+    for name, value in zip(names, (*alpha, *beta), strict=True):
+        estimate = finding.parameters[name]
+        within = 5 * float(estimate.standard_error) + 0.02 * abs(value)
+        assert abs(float(estimate.value) - value) < within, name
+    errors = found.fit["holdout_force_error"]
+    assert errors["after"] < 0.8 * errors["before"]
+
+
+def test_the_answer_does_not_depend_on_units_time_or_direction(healthy):
+    term, alpha, beta = CASES["cogging"]
+    run = planted(healthy[0], term, alpha, beta)
+    plain = explain(run, "gaussian")
+    other = dataclasses.replace(
+        run, time=run.time + 100.0, position=-1e3 * run.position, force=-1e-6 * run.force
+    )
+    turned = explain(other, "gaussian")
+    assert turned.verdict == plain.verdict
+    assert [f.effect for f in turned.findings] == [f.effect for f in plain.findings]
+    ours, theirs = (e.findings[0].parameters for e in (plain, turned))
+    ratio = float(theirs["amplitude"].value) / float(ours["amplitude"].value)
+    assert ratio == pytest.approx(1e-6, rel=0.02)
+    assert float(theirs["pitch"].value) == pytest.approx(1e3 * float(ours["pitch"].value), rel=1e-3)
+
+
+def test_a_wrong_value_is_told_from_missing_physics(healthy):
+    wrong = PARAMETERS | {"viscous+": 90.0, "inertia": 5.5}
+    model = models.from_parameters(models.gaussian(), wrong)
+    found = explain(healthy[0], model, healthy[1])
+    assert [f.effect for f in found.findings] == ["parameter_mismatch"]
+    moved = found.to_dict()["findings"][0]["parameters"]
+    assert moved["inertia"]["from"] == 5.5
+    assert moved["inertia"]["to"] == pytest.approx(5.0, rel=0.01)
+    assert moved["viscous+"]["to"] == pytest.approx(66.0, rel=0.05)
+    right = explain(healthy[0], models.from_parameters(models.gaussian(), PARAMETERS))
+    assert right.verdict == "consistent"
+
+
+def test_another_simulator_is_compared_without_a_model(healthy):
+    x, v = set_point(0)
+    machine = models.from_parameters(models.gaussian(), PARAMETERS)
+    clock = Recording(TIME, np.zeros_like(TIME), x, v)
+    simulation = simulate(machine, clock, PD(kp=18000.0, kd=600.0), substeps=8)
+    simulation = dataclasses.replace(simulation, channels={})
+    term, alpha, beta = CASES["cogging"]
+    found = explain(planted(healthy[1], term, alpha, beta), simulation)
+    assert [f.effect for f in found.findings] == ["cogging"]
+    assert explain(healthy[1], simulation).findings == []
+
+
+def test_the_document_holds_what_the_contract_says(healthy):
+    term, alpha, beta = CASES["cogging"]
+    run, held = (planted(r, term, alpha, beta) for r in healthy)
+    found = explain(run, "gaussian", held)
+    document = json.loads(json.dumps(found.to_dict()))
+    assert document["schema"] == "jaxfric.explanation/1"
+    assert document["verdict"] in ("explained", "partly_explained")
+    assert {"coordinate", "share", "p_value", "detail"} <= set(document["where"][0])
+    finding = document["findings"][0]
+    assert finding["sentence"].startswith("A force periodic in position")
+    assert {"effect", "confusable_with", "equation", "parameters", "share", "holdout_share"} <= set(
+        finding
+    )
+    again = models.Model.from_dict(document["model"])
+    assert float(again.parameters["pitch"]) == pytest.approx(0.01, rel=1e-3)
+
+
+def test_too_short_a_recording_says_so(healthy):
+    short = jax.tree.map(lambda x: x[:300], healthy[0])
+    with pytest.raises(ValueError, match=r"slip|structure"):
+        explain(short, "gaussian")
