@@ -115,7 +115,12 @@ def _html(figure, height: int) -> str:
         height=height,
         margin={"l": 70, "r": 15, "t": 35, "b": 50},
         font={"family": "system-ui, sans-serif", "size": 12, "color": "#222"},
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 1.0, "xanchor": "right"},
+        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
     )
-    config = {"displaylogo": False, "responsive": True, "plotlyServerURL": ""}
+    config = {
+        "displaylogo": False,
+        "displayModeBar": "hover",
+        "responsive": True,
+        "plotlyServerURL": "",
+    }
     return figure.to_html(full_html=False, include_plotlyjs=False, config=config)

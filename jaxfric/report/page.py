@@ -35,8 +35,8 @@ h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.15rem; margin: 2r
 .numbers { display: flex; flex-wrap: wrap; gap: .8rem 2.5rem; margin: 1rem 0; padding: 0; }
 .numbers div { min-width: 9rem; } .numbers dt { color: #555; font-size: .85rem; }
 .numbers dd { margin: 0; font-size: 1.2rem; font-variant-numeric: tabular-nums; }
-table { border-collapse: collapse; width: 100%; margin: .4rem 0 1rem; }
-th, td { text-align: left; vertical-align: top; padding: .35rem .8rem .35rem 0;
+table { border-collapse: collapse; margin: .4rem 0 1rem; }
+th, td { text-align: left; vertical-align: top; padding: .35rem 1.5rem .35rem 0;
   border-bottom: 1px solid #ddd; }
 th { font-weight: 600; font-size: .85rem; color: #444; border-bottom-color: #888; }
 td.number, th.number { text-align: right; white-space: nowrap;
