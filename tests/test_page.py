@@ -188,6 +188,12 @@ def test_nothing_is_loaded_from_elsewhere(full):
     assert "@import" not in outside and "url(" not in outside
 
 
+def test_no_button_uploads_the_recording(full):
+    """Plotly's bar of buttons can have one."""
+    assert full.count('"modeBarButtonsToRemove": ["sendChartToCloud"') == 4
+    assert "BASE_URL='" not in full and "window.PLOTLYENV.BASE_URL=" not in full.split("<body>")[1]
+
+
 def test_without_curves_there_is_no_picture_and_no_script():
     text = page.render(DOCUMENT, {})
     assert "<script" not in text and len(text) < 20000

@@ -121,6 +121,8 @@ def _html(figure, height: int) -> str:
         "displaylogo": False,
         "displayModeBar": "hover",
         "responsive": True,
+        # A recording is its owner's: no button that uploads it.
+        "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud"],
         "plotlyServerURL": "",
     }
     return figure.to_html(full_html=False, include_plotlyjs=False, config=config)
