@@ -108,6 +108,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_simulate,
         _add_export,
         _add_models,
+        _add_effects,
     ):
         add(commands)
     return parser
@@ -248,6 +249,19 @@ def _add_export(commands) -> None:
 
 def _add_models(commands) -> None:
     _add(commands, "models", "commands.models", "the friction models, with their equations")
+
+
+def _add_effects(commands) -> None:
+    command = _add(commands, "effects", "effects.run", "the physics that a model can leave out")
+    command.add_argument("name", nargs="?", metavar="NAME", help="one of them, with parameters")
+    command.add_argument(
+        "--json",
+        type=options.output,
+        nargs="?",
+        const="-",
+        metavar="OUT",
+        help="as JSON, printed or written",
+    )
 
 
 def _add_reading(command: argparse.ArgumentParser) -> None:

@@ -1,6 +1,7 @@
 """`jaxfric export`: a model for another program."""
 
 import sys
+import textwrap
 from argparse import Namespace
 
 from ..export import Exported, export
@@ -32,8 +33,8 @@ def run(arguments: Namespace) -> int:
 def summary(found: Exported, model: Model, target: str) -> str:
     """The cost in a few lines."""
     lines = [f"{target}, force error {_cost(found, model)}"]
-    lines += [f"  left out: {entry}" for entry in found.left_out]
-    lines += [f"  {remark}" for remark in found.remarks]
+    for text in (*(f"left out: {entry}" for entry in found.left_out), *found.remarks):
+        lines += textwrap.wrap(text, 98, initial_indent="  ", subsequent_indent="    ")
     return "\n".join(lines)
 
 
