@@ -8,6 +8,7 @@ from ..explanation import Explanation, explain
 from ..io import write_text
 from ..models import Model, load, named
 from ..recording import Recording
+from ..report import page
 from .commands import put, read
 
 
@@ -35,8 +36,6 @@ def write(found: Explanation, document: dict, arguments: Namespace) -> None:
     if arguments.save:
         put(arguments.save, documents.to_json(found.model.to_dict()))
     if arguments.report:
-        from ..report import page
-
         write_text(arguments.report, page.render(document, found.curves))
 
 

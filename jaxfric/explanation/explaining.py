@@ -12,6 +12,7 @@ from .naming import Named, contest, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .telling import tell
+from .timing import settled
 
 
 def explain(
@@ -38,7 +39,7 @@ def explain(
     """
     known = _known(baseline, seed)
     asked, found = pursue(recording, holdout, known.structure, seed)
-    found = _verified(found, asked, known.structure, seed)
+    found = settled(recording, asked, _verified(found, asked, known.structure, seed))
     wrong = None
     if known.model is not None:
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)

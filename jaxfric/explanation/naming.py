@@ -203,7 +203,7 @@ def search(
     field = Field(evidence, structure)
     while True:
         round_ = contest(evidence, now, field, seed)
-        best = _believed(round_, now, evidence, wide, first=not taken)
+        best = _believed(round_, now, evidence, wide, base if taken else None)
         if best is None or len(taken) >= MOST_TERMS:
             return Named(base, now, taken, round_)
         own = best.trial.candidate.effect.name
@@ -232,12 +232,26 @@ SHARP = frozenset({"transport_delay", "actuator_lag", "compliance", "frictional_
 LINEARITY = 2e-3
 
 
-def _believed(round_: Contest, now: Fit, evidence, wide, first: bool):
-    least = LEAST_SHARE if first else LATER_SHARE
+# What comes after stronger terms must also be this part of what the base left: the first order of
+# a strong effect leaves a second order, which is no effect of its own.
+OF_BASE = 0.01
+# Isolated pushes besides another effect are mostly where that effect switches.
+PUSHES_OF_BASE = 0.05
+
+
+def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit | None):
+    least = LEAST_SHARE if base is None else LATER_SHARE
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
+        if base is not None:
+            pushes = isinstance(finalist.trial.candidate.term, DisturbancePulses)
+            enough &= gained >= (PUSHES_OF_BASE if pushes else OF_BASE) * base.energy
+            again = finalist.trial.candidate.lines is None and any(
+                isinstance(finalist.trial.candidate.term, type(term)) for term in now.terms[1:]
+            )
+            enough &= not again
         if not (finalist.score > 0 and finalist.p_value <= LEVEL and enough):
             continue
         sharp = finalist.trial.candidate.effect.name in SHARP

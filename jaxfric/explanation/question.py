@@ -42,7 +42,7 @@ def ask(
 
     **Arguments:** `known`: the model to align by, by default the baseline.
     """
-    motion = _from_position(recording)
+    motion = from_position(recording)
     evidence = gather(motion)
     wide, delay, sample = _wider(motion, evidence.width), 0.0, evidence.limits.interval
     known = fit([structure], evidence) if known is None else known
@@ -58,7 +58,7 @@ def ask(
             break
     held = None
     if holdout is not None:
-        held = gather(_from_position(holdout), evidence.width, delay)
+        held = gather(from_position(holdout), evidence.width, delay)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     return Question(evidence, wide, held, base, block, structure, delay)
@@ -71,7 +71,7 @@ def _wider(recording: Recording, width: int) -> Evidence | None:
         return None
 
 
-def _from_position(recording: Recording) -> Recording:
+def from_position(recording: Recording) -> Recording:
     """A recorded velocity is late by its filter, which would look like a delay of the force."""
     if recording.position is None:
         return recording

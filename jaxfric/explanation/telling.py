@@ -9,6 +9,7 @@ from ..recording import Recording
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
+from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
 from .locate import Place, locate
@@ -42,17 +43,22 @@ def tell(
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
+    models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
+    drawn = curves(
+        before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
+    )
     return Explanation(
         verdict=_verdict(bool(findings), before, after, _rough(found, asked)),
         where=[_where(place, units) for place in before],
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(found, asked, first),
         not_visible=_not_visible(found, units),
-        model=spelled.model(found.last, recording.units),
-        baseline=spelled.model(first, recording.units),
+        model=models[1],
+        baseline=models[0],
         baseline_name=known.name,
         baseline_parameters=values,
         recording=_facts(recording),
+        curves=drawn,
     )
 
 
