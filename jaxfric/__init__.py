@@ -8,7 +8,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import models as models, scenario as scenario, signals as signals, terms as terms
+    from . import (
+        export as export,
+        models as models,
+        scenario as scenario,
+        signals as signals,
+        terms as terms,
+    )
     from .control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
     from .identification import identify as identify
     from .identified import Identified as Identified, Result as Result
@@ -21,7 +27,7 @@ if TYPE_CHECKING:
     from .simulation import simulate as simulate
     from .uncertainty import Estimate as Estimate
 
-_MODULES = ("models", "scenario", "signals", "terms")
+_MODULES = ("export", "models", "scenario", "signals", "terms")
 _NAMES = {
     "control": ("PD", "PID", "Cascade", "Encoder"),
     "identification": ("identify",),
