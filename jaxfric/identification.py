@@ -154,8 +154,8 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         pull = jnp.zeros_like(alpha)
         left = weak.target - weak.offset(active, recording)
         left = left - weak.columns(active.with_beta(beta), recording) @ alpha
-    block = uncertainty.blocks(rows.positive, rows.negative)
-    matrix = uncertainty.covariance(jacobian, error, weight, block)
+    where = uncertainty.places(weight)
+    matrix = uncertainty.covariance(jacobian, error, weight, where)
     if weighs:
         alpha, matrix = _insert(place[0], mass, alpha, matrix)
         pull = jnp.insert(pull, place[0], 0.0)
@@ -261,9 +261,9 @@ def _mass(friction: Model, recording: Recording, weak: Rows):
     weight = weak.positive + weak.negative
     root = reduced.root(weight)
     mass = least_squares(root[:, None] * push, root * left)
-    block = uncertainty.blocks(weak.positive, weak.negative)
+    place = uncertainty.places(weight)
     left = left - push @ mass
-    return (mass[0], uncertainty.covariance(push, left, weight, block)[0, 0]), left
+    return (mass[0], uncertainty.covariance(push, left, weight, place)[0, 0]), left
 
 
 def _open_ends(columns, slope, weight):

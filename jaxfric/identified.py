@@ -79,7 +79,7 @@ class Identified(eqx.Module):
         """Each parameter's value, standard error and unit, by name."""
         term, units = self.model.term, dict(self.model.units)
         errors = jnp.sqrt(jnp.diagonal(self.covariance, axis1=-2, axis2=-1))
-        freedom = uncertainty.BLOCKS - (len(self.names) + 1) // 2
+        freedom = uncertainty.COSINES
         values = self.model.parameters
         return {
             p.name: Estimate(values[p.name], errors[..., i], spell(p.dimension, units), freedom)

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from .models import NAMED
-from .uncertainty import BLOCKS, student_quantile
+from .uncertainty import COSINES, student_quantile
 
 EQUATIONS = {
     "coulomb-viscous": "F = Fc sign(v) + Fv v",
@@ -60,7 +60,7 @@ def many(documents: Sequence[Mapping[str, Any]]) -> str:
     head = ["file", "model", "force error", *names, "result"]
     rows = [head, ["", "", "", *(units[name] for name in names), ""]]
     for document in documents:
-        cells = [_cell(document["parameters"].get(name), document) for name in names]
+        cells = [_cell(document["parameters"].get(name)) for name in names]
         error = f"{document['force_error']:.2%}"
         file = Path(document["recording"]["file"]).name
         rows.append([file, document["name"], error, *cells, document["result"]])
@@ -76,17 +76,16 @@ def many(documents: Sequence[Mapping[str, Any]]) -> str:
     return "\n".join(lines)
 
 
-def _cell(entry: Mapping[str, Any] | None, document: Mapping[str, Any]) -> str:
+def _cell(entry: Mapping[str, Any] | None) -> str:
     if entry is None or not math.isfinite(entry["standard_error"]):
         return "-"
-    doubtful = _half(entry, document["parameters"]) > abs(entry["value"])
+    doubtful = _half(entry) > abs(entry["value"])
     return f"{'~' * doubtful}{entry['value']:.4g}"
 
 
-def _half(entry: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
+def _half(entry: Mapping[str, Any]) -> float:
     """Half the 95 % interval."""
-    quantile = student_quantile(0.975, BLOCKS - (len(parameters) + 1) // 2)
-    return quantile * entry["standard_error"]
+    return student_quantile(0.975, COSINES) * entry["standard_error"]
 
 
 def _source(document: Mapping[str, Any]) -> list[str]:
@@ -124,7 +123,7 @@ def _rows(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> l
         row = [
             name,
             f"{entry['value']:.5g}" if seen else "-",
-            f"{_half(entry, parameters):.2g}" if seen else "not visible",
+            f"{_half(entry):.2g}" if seen else "not visible",
             entry["unit"],
         ]
         table.append(row + ([f"{truth[name]:.5g}"] if truth else []))
@@ -172,7 +171,7 @@ def _poor(force_error: float) -> list[str]:
 
 def _remarks(parameters: Mapping[str, Any]) -> list[str]:
     """What an engineer would object to, said first."""
-    sizes = {name: (e["value"], _half(e, parameters)) for name, e in parameters.items()}
+    sizes = {name: (e["value"], _half(e)) for name, e in parameters.items()}
     falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
     # An infinite half width is "not visible", which the table and the diagnosis say already.
     faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half < math.inf]

@@ -26,8 +26,8 @@ PROJECTIONS = pytest.mark.parametrize(
 )
 
 
-# Blocks of 1/64 of the record are as short as the correlation: 82 % were measured.
-@pytest.mark.xfail(reason="intervals too short for a slowly varying residual", strict=False)
+# 96 to 97 % were measured on 200 machines; blocks of 1/64 of the record, as short as the
+# correlation, would give 82 %.
 @PROJECTIONS
 def test_coverage_in_closed_loop_with_a_slow_load(projection):
     """The hidden load is correlated over 50 ms, the record holds 40 times twice that."""
@@ -37,12 +37,15 @@ def test_coverage_in_closed_loop_with_a_slow_load(projection):
     assert inside.mean() >= 0.865, inside.mean(axis=1)
 
 
-@pytest.mark.xfail(reason="intervals too short for a slowly varying residual", strict=False)
 @pytest.mark.slow
 @PROJECTIONS
 @pytest.mark.parametrize("name", ["coulomb-viscous", "gaussian"])
 @pytest.mark.parametrize("counts", [None, 1e5, 1e4])
-def test_coverage_over_many_closed_loops(projection, name, counts):
+def test_coverage_over_many_closed_loops(request, projection, name, counts):
+    if name == "gaussian" and counts == 1e4:
+        # 88 % were measured: the velocity of a coarse encoder is smoothed over the bump, and a bias
+        # is no part of a standard error.
+        request.applymarker(pytest.mark.xfail(reason="a coarse encoder biases the bump"))
     if name == "gaussian" and isinstance(projection, jf.WeakForm):
         pytest.skip("kernels leave out the slow samples next to reversals, where the bump is")
     inside = held(name, projection, 200, seed=2, counts=counts)

@@ -2,6 +2,7 @@
 
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -96,8 +97,9 @@ def test_coverage_over_many_machines(name, projection):
 def test_what_is_not_seen_is_infinitely_uncertain():
     columns = jnp.stack([jnp.ones(200), jnp.linspace(0, 1, 200), jnp.linspace(0, 2, 200)], 1)
     noise = jnp.asarray(np.random.default_rng(0).normal(size=200))
-    weight, block = jnp.ones(200), jnp.arange(200) // 7
-    matrix = uncertainty.covariance(columns, noise, weight, block)
+    weight = jnp.ones(200)
+    place = uncertainty.places(weight)
+    matrix = jax.jit(uncertainty.covariance)(columns, noise, weight, place)
     assert bool(jnp.isfinite(matrix[0, 0]))
     assert bool(jnp.isinf(matrix[1, 1])) and bool(jnp.isinf(matrix[2, 2]))
 
@@ -105,13 +107,12 @@ def test_what_is_not_seen_is_infinitely_uncertain():
 def test_the_sandwich_of_white_noise_is_the_classical_covariance():
     rng = np.random.default_rng(1)
     columns = jnp.asarray(rng.normal(size=(6400, 2)) * [1.0, 50.0])
-    block, weight = jnp.asarray(np.arange(6400) // 100), jnp.ones(6400)
-    draws = [
-        np.diagonal(uncertainty.covariance(columns, jnp.asarray(e), weight, block))
-        for e in rng.normal(size=(20, 6400))
-    ]
+    weight = jnp.ones(6400)
+    place = uncertainty.places(weight)
+    spread = jax.jit(lambda e: jnp.diagonal(uncertainty.covariance(columns, e, weight, place)))
+    draws = [spread(jnp.asarray(e)) for e in rng.normal(size=(160, 6400))]
     classical = np.diagonal(np.linalg.inv(np.asarray(columns.T @ columns)))
-    # 64 blocks, 20 draws: the mean variance is known to sqrt(2 / (64 * 20)) = 4 %.
+    # 8 cosines, 160 draws: the mean variance is known to sqrt(2 / (8 * 160)) = 4 %.
     np.testing.assert_allclose(np.mean(draws, axis=0), classical, rtol=0.16)
 
 
