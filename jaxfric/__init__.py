@@ -1,4 +1,4 @@
-"""Friction of drive axes identified without mass and without acceleration.
+"""Friction of drive axes identified without mass and without acceleration; and what is missing.
 
 The public names are loaded when they are first used, so that `import jaxfric` is quick and changes
 nothing; in particular, jax's configuration is left alone.
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         terms as terms,
     )
     from .control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
+    from .explanation import Explanation as Explanation, explain as explain
     from .identification import identify as identify
     from .identified import Identified as Identified, Result as Result
     from .io import read as read
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 _MODULES = ("export", "models", "scenario", "signals", "terms")
 _NAMES = {
     "control": ("PD", "PID", "Cascade", "Encoder"),
+    "explanation": ("Explanation", "explain"),
     "identification": ("identify",),
     "identified": ("Identified", "Result"),
     "io": ("read",),

@@ -38,6 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _configure() -> None:
     """float64, and compiled programs kept in the user's cache folder."""
+    # Explaining multiplies many small matrices, where several threads wait more than they work.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -95,7 +97,8 @@ def _lazily(place: str) -> Callable[[argparse.Namespace], int]:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="jaxfric",
-        description="Friction of drive axes, identified without mass and without acceleration.",
+        description="Friction of drive axes, identified without mass and without acceleration, and "
+        "what a model leaves out of a recording.",
         epilog="JAXFRIC_CACHE: folder for compiled programs, or off.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
@@ -121,7 +124,12 @@ def _add(commands, name: str, run: str, text: str) -> argparse.ArgumentParser:
 
 
 def _add_demo(commands) -> None:
-    command = _add(commands, "demo", "demo.run", "identify the friction of a simulated machine")
+    command = _add(
+        commands,
+        "demo",
+        "demo.run",
+        "a machine with something concealed: recorded, identified, explained",
+    )
     command.add_argument(
         "--out", default="jaxfric-demo", metavar="FOLDER", help="what it writes goes here"
     )

@@ -1,48 +1,62 @@
-"""`jaxfric demo`: a simulated machine is recorded, identified and compared with the truth."""
+"""`jaxfric demo`: a machine with something concealed is recorded, identified and explained."""
 
 from argparse import Namespace
 from pathlib import Path
 
-import jax
-
-from .. import documents, scenario, tabulate
+from .. import concealed, documents, tabulate
+from ..explanation import explain
 from ..io import read, write_table, write_text
-from ..report import pictures
+from ..report import page, pictures
 from . import commands
 
-MODEL = "lorentzian"
-# Of the Coulomb friction, as the noise of a servo drive's torque signal.
-NOISE = 0.02
+# One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.
+SEED = 868
+EFFECT = "cogging"
+SIZE = 0.12
 
 
 def run(arguments: Namespace) -> int:
-    """Write a recording, identify it from that file, print true and identified parameters."""
+    """Record, identify and explain; then say what was concealed."""
     folder = Path(arguments.out)
     folder.mkdir(parents=True, exist_ok=True)
-    machine = scenario.machine()
-    truth = {name: float(value) for name, value in machine.parameters.items()}
-    _record(machine, NOISE * truth["coulomb+"], folder / "axis.csv")
-    recording = read(folder / "axis.csv")
-    name, found = commands.fitted(recording, MODEL)
-    document = documents.identification(found, recording) | {"name": name}
-    print("A simulated ball-screw axis, controlled over two periods, noise on its force.\n")
-    print(tabulate.identification(document, truth))
+    machine = concealed.draw(SEED, (EFFECT,), SIZE)
+    _record(machine, folder)
+    recording, holdout = (read(folder / f"{name}.csv") for name in ("axis", "holdout"))
+    name, fitted = commands.fitted(recording, machine.baseline)
+    document = documents.identification(fitted, recording) | {"name": name}
+    print("A simulated axis in closed loop, with an encoder, noise, and something concealed.\n")
+    print(tabulate.identification(document))
+    print("\nWhat does this model leave out?\n")
+    found = explain(recording, machine.baseline, holdout)
+    told = found.to_dict()
+    print(tabulate.explanation(told))
+    print(f"\nConcealed was: {_truth(machine)}")
     write_text(folder / "identification.json", documents.to_json(document))
+    write_text(folder / "explanation.json", documents.to_json(told))
     write_text(folder / "model.json", documents.to_json(found.model.to_dict()))
-    written = ["axis.csv", "identification.json", "model.json"]
+    written = ["axis.csv", "holdout.csv", "identification.json", "explanation.json", "model.json"]
     missing = ""
     try:
         pictures.library()
-        commands.draw(found, recording, folder / "friction.png")
-        written.append("friction.png")
+        commands.draw(fitted, recording, folder / "friction.png")
+        write_text(folder / "explanation.html", page.render(told, found.curves))
+        written += ["friction.png", "explanation.html"]
     except ValueError as error:
-        missing = f"\nNo picture: {error}"
+        missing = f"\nNo pictures: {error}"
     print(f"\nWritten to {folder}: {', '.join(written)}{missing}")
-    print(f"The same by hand: jaxfric identify {folder / 'axis.csv'} --model {MODEL}")
+    files = f"{folder / 'axis.csv'} --holdout {folder / 'holdout.csv'}"
+    print(f"The same by hand: jaxfric explain {files} --baseline {machine.baseline}")
     return 0
 
 
-def _record(machine, noise: float, path: Path) -> None:
-    made = scenario.record(machine, periods=2, force_noise=noise, key=jax.random.key(0))
-    names = ("time", "force", "position", "velocity")
-    write_table(path, {name: getattr(made, name) for name in names})
+def _record(machine: concealed.Machine, folder: Path) -> None:
+    runs = concealed.record(machine)
+    for name, made in (("axis", runs.recording), ("holdout", runs.holdout)):
+        columns = {"time": made.time, "force": made.force, "position": made.position}
+        write_table(folder / f"{name}.csv", columns | made.channels)
+
+
+def _truth(machine: concealed.Machine) -> str:
+    truth = machine.truth[EFFECT]
+    sizes = ", ".join(f"{amplitude:.3g} N" for amplitude in truth["amplitudes"])
+    return f"cogging with a pitch of {truth['pitch']:.4g} m; amplitudes of its harmonics {sizes}."

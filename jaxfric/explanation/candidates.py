@@ -138,13 +138,13 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
     if kind in (laws.Cogging, laws.PositionDependentFriction):
         sided = kind is laws.PositionDependentFriction
         harmonics = 1 if sided else term.harmonics
-        periods = 1 / line_frequencies(evidence, "position", harmonics)
+        periods = 1 / line_frequencies(evidence, "position")
         if sided:
             stroke = evidence.limits.high - evidence.limits.low
             periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
         yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))
     elif kind is laws.PeriodicDisturbance:
-        tones = line_frequencies(evidence, "time", 1)
+        tones = line_frequencies(evidence, "time")
         yield Candidate(effect, term, tones[:, None], Lines("time", False))
     elif kind is laws.StickySpot:
         yield Candidate(effect, term, _spots(evidence))
@@ -181,7 +181,7 @@ def _spots(evidence: Evidence) -> np.ndarray:
     )
 
 
-def line_frequencies(evidence: Evidence, coordinate: str, harmonics: int) -> np.ndarray:
+def line_frequencies(evidence: Evidence, coordinate: str) -> np.ndarray:
     """Equally spaced frequencies that resolve every line of a coordinate.
 
     From one period in the range (one and a half in time: fewer are a drift) to where a wave at
@@ -195,6 +195,6 @@ def line_frequencies(evidence: Evidence, coordinate: str, harmonics: int) -> np.
         span = limits.high - limits.low
         speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
         low, top = 1.0 / span, top / np.quantile(speed, 0.25)
-    top = max(top / harmonics, 2 * low)
+    top = max(top, 2 * low)
     count = int(np.clip(np.ceil(OVERSAMPLING * span * (top - low)), 16, MOST_LINES))
     return np.linspace(low, min(top, low + count / (OVERSAMPLING * span)), count)

@@ -163,6 +163,7 @@ def gather(
     motion = _padded(parts, prepared)
     centre = index[rows, NODES]
     target = np.sum(average * parts["force"][index], axis=1)[rows]
+    average, slope = _averaged(average), _averaged(slope)
     pads = motion.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
     return Evidence(
@@ -219,7 +220,17 @@ def _node_signals(recording: Recording, limits: Scales, step: int, delay: float)
         name: np.einsum("ij,ij->i", weight, np.where(near, values[at], 0.0))
         for name, values in series.items()
     }
-    return means | {"run": np.where(total > 0, run[centres], -1 - np.arange(len(centres)))}
+    label = np.where(total > 0, run[centres], -1 - np.arange(len(centres)))
+    # Terms are functions of the motion at an instant, not of its mean: the curvature that the
+    # triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
+    # and the columns' weights take it off again, so that force and columns are averaged alike.
+    inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
+    for name in set(means) - {"force", "time", "elapsed"}:
+        values = means[name]
+        bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
+        means[name] = values.copy()
+        means[name][inner] -= bend / 12
+    return means | {"run": label}
 
 
 def _continuous(time, mask, segment, interval) -> np.ndarray:
@@ -256,6 +267,14 @@ def _windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
     slope -= average * slope.sum(axis=1, keepdims=True)
     slope /= np.sum(slope * offset, axis=1, keepdims=True)
     return index, whole, average, slope
+
+
+def _averaged(weights: np.ndarray) -> np.ndarray:
+    """The weights of a triangle's mean around each node, by its second moment."""
+    bend = np.zeros_like(weights)
+    bend[:, 1:-1] = weights[:, 2:] - 2 * weights[:, 1:-1] + weights[:, :-2]
+    bend[:, 0], bend[:, -1] = weights[:, 1], weights[:, -2]
+    return weights + bend / 12
 
 
 def _padded(parts: dict, recording: Recording) -> Recording:

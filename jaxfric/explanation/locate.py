@@ -57,7 +57,7 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
             continue
         if name == "time" and not evidence.clock:
             continue
-        grid = line_frequencies(evidence, name, 1)
+        grid = line_frequencies(evidence, name)
         scan = judge(scaled(Lines(name, False).columns(evidence, grid)))
         names.append(f"{name}_lines")
         raws.append(None)

@@ -123,13 +123,26 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
         if bent and _imitated(trial, now):
             again = _afresh(seen, now, trial)
             found = again if found is None or again.energy < found.energy else found
-        if found is None or (trial.candidate.effect.positive and np.any(found.alpha < 0)):
+        if found is None or not _sensible(trial, found.alpha):
             continue
         gain = 1 - found.energy / now.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
         done.append(found._replace(score=trial.score(gain, size), p_value=p_value))
     return sorted(done, key=lambda finalist: -finalist.score)
+
+
+def _sensible(trial: Trial, alpha: np.ndarray) -> bool:
+    """Whether magnitudes are positive, and the first of several harmonics is no bystander.
+
+    A wave whose fundamental is under a quarter of its strongest harmonic is that harmonic's.
+    """
+    if trial.candidate.effect.positive and np.any(alpha < 0):
+        return False
+    if trial.candidate.lines is None or len(alpha) == 2:
+        return True
+    size = np.hypot(alpha[::2], alpha[1::2])
+    return bool(size[0] >= 0.25 * size.max())
 
 
 def _refined(seen, now, trial, basis) -> Finalist:
