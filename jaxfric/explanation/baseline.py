@@ -66,16 +66,12 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     term = model.term
     alpha = np.asarray(model.alpha, float)
     beta = np.asarray(term.beta(), float).reshape(len(term.nonlinear))
-    start = Fit((term,), (beta,), (alpha,), *_nothing(evidence), evidence.target, 0.0)
+    empty = np.zeros((len(evidence.target), 0))
+    start = Fit((term,), (beta,), (alpha,), empty, empty, evidence.target, 0.0)
     seen = with_predictions(evidence, start)
     columns = seen.columns(term, beta[None])[0]
     left = evidence.target - columns @ alpha
     return start._replace(columns=columns, residual=left, energy=float(left @ left))
-
-
-def _nothing(evidence):
-    empty = np.zeros((len(evidence.target), 0))
-    return empty, empty
 
 
 def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:

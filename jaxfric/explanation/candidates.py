@@ -135,9 +135,9 @@ def _leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
 
 def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iterator[Candidate]:
     kind = type(term)
-    if kind in (laws.Cogging, laws.PositionDependentFriction):
-        sided = kind is laws.PositionDependentFriction
-        harmonics = 1 if sided else term.harmonics
+    if isinstance(term, laws.Cogging | laws.PositionDependentFriction):
+        sided = isinstance(term, laws.PositionDependentFriction)
+        harmonics = term.harmonics if isinstance(term, laws.Cogging) else 1
         periods = 1 / line_frequencies(evidence, "position")
         if sided:
             stroke = evidence.limits.high - evidence.limits.low

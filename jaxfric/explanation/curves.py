@@ -53,7 +53,8 @@ def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dic
     name = place.coordinate
     if name.endswith("_lines"):
         stem = name.removesuffix("_lines")
-        value, side = np.asarray(getattr(seen.motion, stem))[seen.centre], 1.0
+        value = np.asarray(getattr(seen.motion, stem))[seen.centre]
+        side = np.ones_like(value)
         period = 1 / place.peak
         value = np.mod(value, period)
         unit = units["position"] if stem == "position" else "s"
@@ -61,7 +62,8 @@ def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dic
     else:
         nodes = coordinates(seen)[name][0]
         value, label = nodes[seen.centre], name.replace("_", " ")
-        side = seen.side if "direction" in name or "since" in name else 1.0
+        sided = "direction" in name or "since" in name
+        side = seen.side if sided else np.ones_like(value)
         stem = name.removesuffix("_by_direction").removesuffix("_by_acceleration")
         unit = _UNITS.get(stem, "s").format(**units)
     edges = np.quantile(value, np.linspace(0, 1, BINS + 1))

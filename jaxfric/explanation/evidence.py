@@ -37,8 +37,8 @@ class Evidence(NamedTuple):
     - `target`: the force of each row, N, `(J,)`; `side`: its direction, ±1.
     - `centre`: the node in the middle of each row, `(J,)`.
     - `elapsed`: time since the start without interruptions, s, at the nodes, `(M,)`.
-    - `limits`: magnitudes of the recording; `reach`: the kernel's half-width, s; `width`: the same
-      in samples.
+    - `limits`: magnitudes of the recording, `Scales` of floats; `reach`: the kernel's half-width,
+      s; `width`: the same in samples.
     - `clock`: whether the time stamps increase throughout, so that time is a coordinate.
     """
 
@@ -51,7 +51,7 @@ class Evidence(NamedTuple):
     side: np.ndarray
     centre: np.ndarray
     elapsed: np.ndarray
-    limits: Scales
+    limits: Any
     reach: float
     width: int
     clock: bool

@@ -142,7 +142,8 @@ _NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direc
 def _knots(name: str, values: np.ndarray) -> np.ndarray:
     places = np.quantile(values, _EARLY if "since" in name else _EVEN)
     if name in _NOISY:
-        places = np.linspace(*np.quantile(values, [0.01, 0.99]), KNOTS)
+        low, high = np.quantile(values, [0.01, 0.99])
+        places = np.linspace(low, high, KNOTS)
     width = places[-1] - places[0]
     # Strictly increasing, by a millionth of the range, where many samples share one value.
     return places + 1e-6 * (width if width > 0 else 1.0) * np.arange(len(places))

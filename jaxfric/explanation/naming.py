@@ -211,7 +211,8 @@ def search(
     **Arguments:** `wide`: the recording through a kernel of twice the width, where terms that act
     on derivatives of the force must show alike.
     """
-    now, taken = base, []
+    now = base
+    taken: list[Taken] = []
     evidence = with_predictions(evidence, now)
     field = Field(evidence, structure)
     while True:

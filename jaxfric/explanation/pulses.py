@@ -53,7 +53,8 @@ def _outstanding(residual, time, width, spacing) -> list[float]:
         return []
     height = np.convolve(residual, shape / np.sqrt(shape @ shape), "same")
     spread = np.median(np.abs(height)) / 0.6745
-    left, places = np.abs(height) / max(spread, 1e-300), []
+    left = np.abs(height) / max(spread, 1e-300)
+    places: list[float] = []
     for _ in range(MOST):
         peak = int(np.argmax(left))
         if left[peak] < OUTSTANDING:

@@ -86,7 +86,7 @@ class Beside:
 class Space:
     """The compact set of the nonlinear parameters of some terms, in coordinates from 0 to 1."""
 
-    def __init__(self, terms: Sequence[AbstractTerm], evidence: Evidence):
+    def __init__(self, terms: Sequence[AbstractTerm], evidence: "Evidence | Beside"):
         limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
         boxes = [_box(term, limits) for term in terms]
         self.counts = [len(term.nonlinear) for term in terms]
@@ -132,10 +132,10 @@ def fit(
     result's columns and residual are what those leave.
     """
     terms = tuple(terms)
-    evidence = evidence if beside is None else Beside(evidence, beside)
-    space = Space(terms, evidence)
+    rows: Evidence | Beside = evidence if beside is None else Beside(evidence, beside)
+    space = Space(terms, rows)
     if not sum(space.counts):
-        return _at(terms, evidence, space, np.zeros(0), derivatives=True)
+        return _at(terms, rows, space, np.zeros(0), derivatives=True)
     place = np.full(sum(space.counts), 0.5)
     known = list(start) if start is not None else [None] * len(terms)
     unknown = [i for i, b in enumerate(known) if b is None]
@@ -144,8 +144,8 @@ def fit(
     ]
     place = space.place(np.concatenate(filled))
     if unknown:
-        place = _scan(terms, evidence, space, place, unknown)
-    return _refine(terms, evidence, space, place, iterations)
+        place = _scan(terms, rows, space, place, unknown)
+    return _refine(terms, rows, space, place, iterations)
 
 
 def _at(terms, evidence, space, place, derivatives=False) -> Fit:
