@@ -142,7 +142,7 @@ def gather(
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", num_segments=1)
     prepared = signals.prepare(pad(nameless, _octave(count)))
-    width = half_width or signals.kernel_half_width(prepared)
+    width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
     limits = Scales(*(float(x) for x in _scales(prepared)))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
@@ -184,6 +184,14 @@ def gather(
 
 
 _scales = eqx.filter_jit(signals.scales)
+
+# Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
+# axis hardly accelerates, the noise of its acceleration would ask for wider ones.
+KERNELS = 192
+
+
+def _widest(recording: Recording) -> int:
+    return max(16, int(np.count_nonzero(np.asarray(recording.mask))) // KERNELS)
 
 
 def _octave(count: int) -> int:

@@ -220,11 +220,7 @@ def search(
         best = _believed(round_, now, evidence, wide, base if taken else None)
         if best is None or len(taken) >= MOST_TERMS:
             return Named(base, now, taken, round_)
-        own = best.trial.candidate.effect.name
-        close = [
-            f.trial.candidate.effect.name for f in round_.finalists if f.score > best.score - RIVAL
-        ]
-        rivals = tuple(dict.fromkeys(name for name in close if name != own))
+        best, rivals = _rivals(best, round_, now, evidence)
         taken.append(Taken(best.trial, rivals, best.p_value))
         terms = (*now.terms, best.trial.candidate.term)
         now = fit(terms, evidence, best.betas)
@@ -236,6 +232,42 @@ def search(
 # A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
 # 1995 call ten on twice this scale very strong).
 RIVAL = 5.0
+# Nor one whose force is the same but for 5 %: what noise, which is never quite as assumed, makes of
+# the rest decides between them.
+ALIKE = 0.95
+
+
+def _rivals(
+    best: Finalist, round_: Contest, now: Fit, evidence
+) -> tuple[Finalist, tuple[str, ...]]:
+    """The effects that cannot be told from the best; a line in position goes before one in time.
+
+    At constant speed the two are one and the same, and a machine has more pitches than clocks.
+    """
+    basis, force = now.basis(), _force(best, evidence)
+    force = force - basis @ (basis.T @ force)
+    alike = []
+    for other in round_.finalists:
+        if other.trial.candidate.effect.name == best.trial.candidate.effect.name:
+            continue
+        theirs = _force(other, evidence)
+        theirs = theirs - basis @ (basis.T @ theirs)
+        size = np.linalg.norm(force) * np.linalg.norm(theirs)
+        same = size > 0 and abs(force @ theirs) > ALIKE * size
+        if same or other.score > best.score - RIVAL:
+            alike.append((other, same))
+    names = [f.trial.candidate.effect.name for f, _ in alike]
+    own = best.trial.candidate.effect.name
+    twin = [f for f, same in alike if same and f.trial.candidate.effect.name == "cogging"]
+    if own == "periodic_disturbance" and twin and twin[0].p_value <= LEVEL:
+        best = twin[0]
+        names = [own, *(name for name in names if name != "cogging")]
+    return best, tuple(dict.fromkeys(names))
+
+
+def _force(finalist: Finalist, evidence) -> np.ndarray:
+    columns = evidence.columns(finalist.trial.candidate.term, finalist.betas[-1][None])[0]
+    return columns @ finalist.alpha
 
 
 # Effects whose columns hold a derivative of the acceleration: what the encoder's noise makes of
