@@ -354,13 +354,43 @@ def test_demo_from_the_core_dependencies_alone(tmp_path):
     done = run(code=code, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "jaxfric[report]" in done.stdout
-    document = strict((tmp_path / "jaxfric-demo" / "identification.json").read_text("utf-8"))
+    folder = tmp_path / "jaxfric-demo"
+    document = strict((folder / "identification.json").read_text("utf-8"))
     assert document["result"] == "successful"
-    truth = jaxfric.scenario.TRUTH
-    for name, entry in document["parameters"].items():
-        assert abs(entry["value"] - truth[name]) < 0.05 * truth[name], name
-    assert (tmp_path / "jaxfric-demo" / "axis.csv").exists()
-    assert not (tmp_path / "jaxfric-demo" / "friction.png").exists()
+    told = strict((folder / "explanation.json").read_text("utf-8"))
+    assert [finding["effect"] for finding in told["findings"]] == ["cogging"]
+    errors = told["fit"]["holdout_force_error"]
+    assert errors["after"] < 0.2 * errors["before"]
+    assert (folder / "axis.csv").exists() and (folder / "model.json").exists()
+    assert not (folder / "friction.png").exists()
+
+
+def test_explain_writes_what_it_says(tmp_path, capsys):
+    draw = np.random.default_rng(0)
+    time = np.arange(8000) / 1000.0
+    x = 0.05 * np.sin(2 * np.pi * time) + 0.02 * np.sin(2 * np.pi * 2.3 * time)
+    v, a = np.gradient(x, time), np.gradient(np.gradient(x, time), time)
+    force = 3 * a + 10 * np.sign(v) + 40 * v + 2 * np.sin(2 * np.pi * x / 0.008)
+    table = np.column_stack([time, x, force + 0.1 * draw.normal(size=time.size)])
+    path = tmp_path / "axis.csv"
+    np.savetxt(path, table, delimiter=",", header="time,position,force", comments="")
+    out, page, model = (tmp_path / name for name in ("e.json", "e.html", "m.json"))
+    options = ["--json", str(out), "--report", str(page), "--save", str(model)]
+    assert main(["explain", str(path), "--baseline", "coulomb-viscous", *options]) == 0
+    printed = capsys.readouterr().out
+    told = strict(out.read_text("utf-8"))
+    assert told["schema"] == "jaxfric.explanation/1"
+    assert told["findings"][0]["effect"] == "cogging"
+    assert " ".join(told["findings"][0]["sentence"].split()[:6]) in printed
+    assert "<html" in page.read_text("utf-8")[:400]
+    assert main(["predict", str(model), str(path), "-o", str(tmp_path / "p.csv")]) == 0
+    capsys.readouterr()
+    assert main(["explain", str(path), "--baseline", "nonsense"]) == 2
+    assert "no model is called" in capsys.readouterr().err.lower()
+    short = tmp_path / "short.csv"
+    np.savetxt(short, table[:100], delimiter=",", header="time,position,force", comments="")
+    assert main(["explain", str(short)]) == 2
+    assert "short.csv" in capsys.readouterr().err
 
 
 @pytest.mark.slow
