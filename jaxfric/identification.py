@@ -1,13 +1,14 @@
 """Identification: the grid in one batched call, the refinement, the mass, the intervals."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import reduced, signals, small, uncertainty
+from . import reduced, signals, uncertainty, weighing
 from .identified import Identified, Result, raise_unless_successful
 from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
@@ -142,23 +143,10 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     alpha, jacobian, error = _solve(active, beta, recording, rows)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)
-    place = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
-    weighs = place and active is not term
-    if weighs:
-        mass, left = _mass(Model(active.with_beta(beta), alpha), recording, weak)
-        # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
-        slope = signals.local_quadratic(recording, recording.velocity, 8 * limits.interval, 8)[1]
-        error = error - mass[0] * slope
-        pull = _open_ends(jacobian[:, : alpha.size], slope, rows.moving) * mass[0]
-    else:
-        pull = jnp.zeros_like(alpha)
-        left = weak.target - weak.offset(active, recording)
-        left = left - weak.columns(active.with_beta(beta), recording) @ alpha
-    where = uncertainty.places(weight)
-    matrix = uncertainty.covariance(jacobian, error, weight, where)
-    if weighs:
-        alpha, matrix = _insert(place[0], mass, alpha, matrix)
-        pull = jnp.insert(pull, place[0], 0.0)
+    alpha, spread, left, pull = _judged(
+        active.with_beta(beta), alpha, jacobian, error, term, recording, rows, weak
+    )
+    matrix = spread.covariance
     nothing = ~finite | (jnp.sum(weight) <= 0)
     alpha = jnp.where(nothing, jnp.nan, alpha)
     matrix = jnp.where(nothing, jnp.inf, matrix)
@@ -175,6 +163,44 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
         minimum,
         pull,
         "weak_form" if projection.keeps_inertia else "closed_windows",
+    )
+
+
+class _Judged(NamedTuple):
+    """Affine parameters of the whole term, deviations of all parameters, what is left of the weak
+    form's rows, and the bias that open ends would leave.
+    """
+
+    alpha: Float[Array, " q"]
+    deviations: uncertainty.Deviations
+    left: Float[Array, " J"]
+    open_ends: Float[Array, " q"]
+
+
+def _judged(known, alpha, jacobian, error, term, recording, rows: Rows, weak: Rows) -> _Judged:
+    """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
+    weight = rows.positive + rows.negative
+    place = uncertainty.places(weight)
+    index = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
+    if not index or alpha.size == len(term.affine):
+        left = error
+        if weak is not rows:
+            left = weak.target - weak.offset(known, recording)
+            left = left - weak.columns(known, recording) @ alpha
+        spread = uncertainty.deviations(jacobian, error, weight, place)
+        return _Judged(alpha, spread, left, jnp.zeros_like(alpha))
+    offset = known.offset(recording)
+    weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
+    # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
+    typical = signals.interval(recording)
+    slope = signals.local_quadratic(recording, recording.velocity, 8 * typical, 8)[1]
+    spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
+    pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
+    return _Judged(
+        jnp.insert(alpha, index[0], weighed.mass),
+        weighed.beside(spread, index[0]),
+        weighed.left,
+        jnp.insert(pull, index[0], 0.0),
     )
 
 
@@ -230,7 +256,7 @@ def _solve(term, beta, recording, rows: Rows):
     columns = rows.columns(known, recording)
     target = rows.target - rows.offset(known, recording)
     root = reduced.root(rows.positive + rows.negative)
-    alpha = least_squares(root[:, None] * columns, root * target)
+    alpha = reduced.least_squares(root[:, None] * columns, root * target)
     if not term.nonlinear:
         return alpha, columns, target - columns @ alpha
 
@@ -239,41 +265,3 @@ def _solve(term, beta, recording, rows: Rows):
 
     jacobian = jnp.concatenate([columns, jax.jacfwd(by_beta)(beta)], axis=1)
     return alpha, jacobian, target - columns @ alpha
-
-
-def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
-    """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
-    scale = reduced.root(jnp.sum(columns**2, axis=0))
-    scale = jnp.where(scale > 0, scale, 1.0)
-    basis = reduced.orthonormal(columns / scale[None, :])
-    upper = jnp.triu(basis.T @ (columns / scale[None, :]))
-    idle = jnp.diagonal(upper) <= 0
-    upper = jnp.where(idle[:, None], jnp.eye(scale.shape[0], dtype=upper.dtype), upper)
-    return small.invert_upper(upper) @ (basis.T @ target) / scale
-
-
-def _mass(friction: Model, recording: Recording, weak: Rows):
-    """Mass and its variance, from what the friction leaves of the weak form's force; the rest."""
-    velocity, force = recording.velocity, friction.force(recording)
-    still = jnp.zeros_like(velocity)
-    pushed = weak.project(jnp.stack([still, force], 1), jnp.stack([velocity, still], 1))
-    push, left = pushed[:, :1], weak.target - pushed[:, 1]
-    weight = weak.positive + weak.negative
-    root = reduced.root(weight)
-    mass = least_squares(root[:, None] * push, root * left)
-    place = uncertainty.places(weight)
-    left = left - push @ mass
-    return (mass[0], uncertainty.covariance(push, left, weight, place)[0, 0]), left
-
-
-def _open_ends(columns, slope, weight):
-    """D⁻¹ ∫ v̇ g dt over all slip: what Lemma 1 makes zero where the end velocities are equal."""
-    root = reduced.root(weight)
-    return least_squares(root[:, None] * columns, root * slope)
-
-
-def _insert(place, mass, alpha, matrix):
-    """Affine parameters and covariance with the mass in its place among them."""
-    alpha = jnp.insert(alpha, place, mass[0])
-    matrix = jnp.insert(jnp.insert(matrix, place, 0.0, axis=0), place, 0.0, axis=1)
-    return alpha, matrix.at[place, place].set(mass[1])

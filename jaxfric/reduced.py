@@ -99,6 +99,17 @@ def cost(
     return jnp.sum(residual(basis, target, bumps) ** 2)
 
 
+def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
+    """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
+    scale = root(jnp.sum(columns**2, axis=0))
+    scale = jnp.where(scale > 0, scale, 1.0)
+    basis = orthonormal(columns / scale[None, :])
+    upper = jnp.triu(basis.T @ (columns / scale[None, :]))
+    idle = jnp.diagonal(upper) <= 0
+    upper = jnp.where(idle[:, None], jnp.eye(scale.shape[0], dtype=upper.dtype), upper)
+    return small.invert_upper(upper) @ (basis.T @ target) / scale
+
+
 class Moments(eqx.Module):
     """All that the reduced cost of one bump needs of the rows, for several weightings of them.
 

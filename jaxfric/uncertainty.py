@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from . import small
 from .reduced import orthonormal
@@ -54,19 +54,34 @@ def places(weight: Float[Array, " J"]) -> Float[Array, " J"]:
     return (total - 0.5 * weight) / jnp.where(total[-1] > 0, total[-1], 1.0)
 
 
-def covariance(
+class Deviations(NamedTuple):
+    """How far each cosine finds the estimate from the truth, and what the rows do not determine.
+
+    - `votes`: a deviation of all parameters for each cosine, `(K, p)`, scaled so that the sum of
+      squares is the covariance.
+    - `hidden`: parameters with a part in a direction that the rows do not determine, `(p,)`.
+    """
+
+    votes: Float[Array, "K p"]
+    hidden: Bool[Array, " p"]
+
+    @property
+    def covariance(self) -> Float[Array, "p p"]:
+        """Covariance of the parameters, `(p, p)`; infinite variance for the hidden ones."""
+        hidden = jnp.where(self.hidden, jnp.inf, 0.0).astype(self.votes.dtype)
+        return self.votes.T @ self.votes + jnp.diag(hidden)
+
+
+def deviations(
     jacobian: Float[Array, "J p"],
     error: Float[Array, " J"],
     weight: Float[Array, " J"],
     place: Float[Array, " J"],
-) -> Float[Array, "p p"]:
-    """Covariance of weighted least-squares parameters by cosines of the scores, `(p, p)`.
+) -> Deviations:
+    """The deviations of weighted least-squares parameters, by cosines of the scores.
 
     **Arguments:** `jacobian`, derivative of the rows by the parameters, `(J, p)`; `error`, the
     residual, `(J,)`; `weight`, `(J,)`; `place`, from [`places`][].
-
-    **Returns:** the covariance; infinite variance for every parameter with a part in a direction
-    that the rows do not determine.
     """
     root = jnp.sqrt(weight)[:, None]
     scale = jnp.linalg.norm(root * jacobian, axis=0)
@@ -80,12 +95,11 @@ def covariance(
     inverse = small.invert_upper(jnp.where(seen[:, None], upper, identity))
     order = jnp.arange(1, COSINES + 1).astype(place.dtype)
     votes = jax.lax.map(lambda k: _vote(white, root[:, 0] * error, jnp.pi * k * place), order)
-    spread = inverse @ votes.T / COSINES**0.5
-    matrix = spread @ spread.T / (scale[:, None] * scale[None, :])
+    spread = votes @ inverse.T / COSINES**0.5
     # A column that the others span, and every column that takes part in spanning it.
     spanned = jnp.where(seen[None, :], 0.0, inverse)
     hidden = jnp.max(jnp.abs(spanned), axis=1) > 1e-3
-    return matrix + jnp.diag(jnp.where(hidden, jnp.inf, 0.0))
+    return Deviations(spread / scale[None, :], hidden)
 
 
 def _vote(

@@ -15,7 +15,7 @@ ORDER = """
     units recording terms signals models catalogue effects
     columns delimited cleaning tables io
     small refine projections reduced compress uncertainty search
-    identified identification selection online fleet
+    weighing identified identification selection online fleet
     control plant prediction simulation scenario
     explanation concealed documents glossary tabulate report export cli __main__
 """.split()
