@@ -208,6 +208,10 @@ def explanation(document: Mapping[str, Any]) -> str:
     lines += [f"  {note}" for note in facts.get("notes", [])]
     lines += ["", f"baseline {document['baseline']['name']}", ""]
     lines += _wrapped(f"{document['verdict']}: {document['summary']}")
+    motion = document["fit"].get("simulation_error")
+    if motion and motion["before"] is not None:
+        after = "not to be run" if motion["after"] is None else f"{motion['after']:.2%}"
+        lines += [f"Run forward: velocity error {motion['before']:.2%} before, {after} after."]
     for finding in document["findings"]:
         lines += ["", finding["effect"], *(f"  {line}" for line in _wrapped(finding["sentence"]))]
         if finding["confusable_with"] and finding["separate_by"]:

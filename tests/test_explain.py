@@ -160,6 +160,13 @@ def test_the_document_holds_what_the_contract_says(healthy):
     assert float(again.parameters["pitch"]) == pytest.approx(0.01, rel=1e-3)
 
 
+def test_the_models_run_forward_before_and_after(healthy):
+    term, alpha, beta = CASES["spring"]
+    run = planted(healthy[0], term, tuple(5 * a for a in alpha), beta)
+    errors = explain(run, "gaussian", simulate=True).fit["simulation_error"]
+    assert errors["after"] < 0.7 * errors["before"] < 0.1
+
+
 def test_too_short_a_recording_says_so(healthy):
     short = jax.tree.map(lambda x: x[:300], healthy[0])
     with pytest.raises(ValueError, match=r"slip|structure"):

@@ -192,6 +192,9 @@ def _add_explain(commands) -> None:
         help="keep a saved model's parameters, unless they are found wrong, instead of refitting",
     )
     command.add_argument(
+        "--simulate", action="store_true", help="run the models forward too, before and after"
+    )
+    command.add_argument(
         "--json", type=options.output, metavar="OUT", help="write the explanation; - prints it"
     )
     command.add_argument(

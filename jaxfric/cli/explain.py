@@ -18,7 +18,9 @@ def run(arguments: Namespace) -> int:
     holdout = read(arguments.holdout, arguments)[0] if arguments.holdout else None
     baseline = _baseline(arguments)
     try:
-        found = explain(recording, baseline, holdout, fixed=arguments.fixed)
+        found = explain(
+            recording, baseline, holdout, fixed=arguments.fixed, simulate=arguments.simulate
+        )
     except ValueError as error:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()

@@ -8,6 +8,7 @@ from . import verification
 from .baseline import Baseline, at_values, baseline_of, mismatch, simulated
 from .candidates import OF_THE_MOMENT, Field
 from .explained import Explanation
+from .forward import motion_error
 from .naming import Named, contest, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
@@ -21,6 +22,7 @@ def explain(
     holdout: Recording | None = None,
     *,
     fixed: bool = False,
+    simulate: bool = False,
     seed: int = 0,
 ) -> Explanation:
     """What a model leaves out of a recording: where, what, how much, and what could not be seen.
@@ -32,6 +34,8 @@ def explain(
       identification, whose values are questioned first (`parameter_mismatch`); or a recording
       of another simulator, of the same reference or the same motion.
     - `fixed`: values that are not found wrong stay as given, instead of being refitted.
+    - `simulate`: run both models forward, from the recorded motion and by the recorded force, piece
+      by piece, and compare the velocities (`fit["simulation_error"]`); takes some seconds more.
     - `seed`: of the bootstrap.
 
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
@@ -45,7 +49,12 @@ def explain(
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)
         if wrong is None and fixed:
             asked, found = _as_given(known, asked, seed)
-    return tell(recording, asked, found, known, wrong, seed)
+    explanation = tell(recording, asked, found, known, wrong, seed)
+    if simulate:
+        models = {"before": explanation.baseline, "after": explanation.model}
+        errors = {when: motion_error(model, recording) for when, model in models.items()}
+        explanation.fit["simulation_error"] = errors
+    return explanation
 
 
 def _known(baseline, seed: int) -> Baseline:

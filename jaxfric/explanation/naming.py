@@ -254,7 +254,13 @@ def _rivals(
         theirs = theirs - basis @ (basis.T @ theirs)
         size = np.linalg.norm(force) * np.linalg.norm(theirs)
         same = size > 0 and abs(force @ theirs) > ALIKE * size
-        if same or other.score > best.score - RIVAL:
+        # A term that is but the first order of its effect leaves a rest that is no evidence
+        # against the effects that it is known to be confused with, if they are believed at all.
+        effect = best.trial.candidate.effect
+        excused = effect.first_order and other.trial.candidate.effect.name in effect.confusable_with
+        half = now.energy - other.energy >= 0.5 * (now.energy - best.energy)
+        believed = other.p_value <= LEVEL and half
+        if same or other.score > best.score - RIVAL or (excused and believed):
             alike.append((other, same))
     names = [f.trial.candidate.effect.name for f, _ in alike]
     own = best.trial.candidate.effect.name
