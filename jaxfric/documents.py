@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .identified import Identified, Result, result_names
+from .identified import Identified, result_names
 from .recording import Recording
 
 IDENTIFICATION = "jaxfric.identification/1"
@@ -50,7 +50,7 @@ def identification(found: Identified, recording: Recording, notes: Sequence[str]
         "covered": float(found.covered),
         "open_ends": open_ends(found),
         "result": result,
-        "diagnosis": str(Result[found.result]),
+        "diagnosis": found.diagnosis,
         "force_error": float(found.force_error),
     }
 

@@ -2,7 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from . import uncertainty
 from .models import Model
@@ -11,7 +11,12 @@ from .units import spell
 
 
 class Result(eqx.Enumeration):
-    """How an identification ended; each member's text is the diagnosis and the remedy."""
+    """Whether the parameters are determined; each member's text is the diagnosis and the remedy.
+
+    How well the model describes the force is another question, which no further data of the kind
+    would settle: a parameter of a poor model can be known exactly. `force_error` and
+    [`Identified.diagnosis`][] answer it.
+    """
 
     successful = "The parameters were identified."
     on_border = (
@@ -43,6 +48,10 @@ class Result(eqx.Enumeration):
     )
 
 
+# Below this share of the force's power the model explains less than it leaves, whatever the axis.
+LEAST_EXPLAINED = 0.5
+
+
 class Identified(eqx.Module):
     """What identification found.
 
@@ -67,6 +76,26 @@ class Identified(eqx.Module):
     cost: Float[Array, ""]
     open_ends: Float[Array, " p"]
     projection: str = eqx.field(static=True)
+
+    @property
+    def describes(self) -> Bool[Array, ""]:
+        """Whether the model explains more of the force's power than it leaves."""
+        return self.force_error**2 <= 1 - LEAST_EXPLAINED
+
+    @property
+    def diagnosis(self) -> str:
+        """What the result means, and a word where the model does not describe the force.
+
+        For one recording; of a batch, take a row.
+        """
+        text = str(Result[self.result])
+        if bool(self.describes) or not bool(jnp.isfinite(self.force_error)):
+            return text
+        return (
+            f"{text} The model leaves {float(self.force_error):.0%} of the force: more than half "
+            "of its power is neither friction of this kind nor inertia, so that these parameters "
+            "describe the recording badly. jaxfric explain says what the model leaves out."
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,8 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from .identified import Result
 from .models import NAMED
 from .uncertainty import COSINES, student_quantile
+
+# The diagnosis that needs no words.
+FINE = str(Result[Result.successful])
 
 EQUATIONS = {
     "coulomb-viscous": "F = Fc sign(v) + Fv v",
@@ -45,9 +49,8 @@ def identification(
     lines += ["", *_wrapped(f"model {document['name']}; {_how(document, automatic)}"), ""]
     lines += _rows(document["parameters"], truth)
     lines += ["", f"force error {document['force_error']:.2%}   result {document['result']}"]
-    if document["result"] != "successful":
+    if document["diagnosis"] != FINE:
         lines += _wrapped(document["diagnosis"])
-    lines += _poor(document["force_error"])
     lines += _remarks(document["parameters"]) + _closing(document)
     return "\n".join(lines)
 
@@ -70,9 +73,9 @@ def many(documents: Sequence[Mapping[str, Any]]) -> str:
     lines = [f"model {documents[0]['name']}", ""] if same_model else []
     lines += _aligned(rows, numeric)
     lines += ["", "~ the 95 % interval is wider than the value; - not visible; intervals: --json"]
-    for verdict in dict.fromkeys(d["result"] for d in documents if d["result"] != "successful"):
-        diagnosis = next(d["diagnosis"] for d in documents if d["result"] == verdict)
-        lines += _wrapped(f"{verdict}: {diagnosis}")
+    for result, diagnosis in dict.fromkeys((d["result"], d["diagnosis"]) for d in documents):
+        if diagnosis != FINE:
+            lines += _wrapped(f"{result}: {diagnosis}")
     return "\n".join(lines)
 
 
@@ -156,16 +159,6 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
         "Used whole, with its unequal end velocities, the record would be off in "
         + ", ".join(gains)
         + "."
-    )
-
-
-def _poor(force_error: float) -> list[str]:
-    """A warning where most of the force's power is something else than the model."""
-    if not force_error**2 > 0.5:
-        return []
-    return _wrapped(
-        f"The model leaves {force_error:.0%} of the force: more than half of its power is neither "
-        "friction nor inertia, so that these parameters describe this recording badly."
     )
 
 

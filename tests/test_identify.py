@@ -90,6 +90,17 @@ def test_a_batch_keeps_failures_in_their_row():
     assert bool(jnp.isinf(found.parameters["coulomb+"].standard_error[1]))
 
 
+def test_a_model_that_leaves_most_of_the_force_is_said_to():
+    good = recording(machine("coulomb-viscous"), noise=0.1)
+    hidden = dataclasses.replace(good, force=good.force + 40 * jnp.sin(40 * good.position))
+    fine, poor = (jf.identify("coulomb-viscous", log) for log in (good, hidden))
+    # Its parameters are determined all the same, and uncertain as they are.
+    assert [result_names()[int(f.result._value)] for f in (fine, poor)] == ["successful"] * 2
+    assert bool(fine.describes) and not bool(poor.describes)
+    assert fine.diagnosis == "The parameters were identified."
+    assert "neither friction of this kind" in poor.diagnosis
+
+
 def test_throw_raises_with_the_diagnosis():
     good = recording(machine())
     rest = dataclasses.replace(good, velocity=jnp.zeros_like(good.velocity))
