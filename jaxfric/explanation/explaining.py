@@ -1,5 +1,12 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
+import dataclasses
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
 from ..identified import Identified
 from ..models import Model, named
 from ..recording import Recording
@@ -41,6 +48,25 @@ def explain(
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
     chance.
     """
+    with jax.enable_x64(True):  # a few thousand rows: single precision would save nothing
+        ours, theirs = _double(recording), None if holdout is None else _double(holdout)
+        told = _explain(ours, _double(baseline), theirs, fixed, simulate, seed)
+    own = recording.time.dtype
+    models = {name: _double(getattr(told, name), own) for name in ("model", "baseline")}
+    return dataclasses.replace(told, **models)
+
+
+def _double(tree, dtype=float):
+    """Every floating-point array in double (or another) precision; anything else as it is."""
+
+    def cast(leaf):
+        inexact = eqx.is_array(leaf) and jnp.issubdtype(leaf.dtype, jnp.floating)
+        return jnp.asarray(np.asarray(leaf), dtype) if inexact else leaf
+
+    return tree if isinstance(tree, str) else jax.tree.map(cast, tree)
+
+
+def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: int) -> Explanation:
     known = _known(baseline, seed)
     asked, found = pursue(recording, holdout, known.structure, seed)
     found = settled(recording, asked, _verified(found, asked, known.structure, seed))

@@ -48,7 +48,7 @@ def motion_error(model: Model, recording: Recording) -> float | None:
     run = np.asarray(simulate(model, cut).velocity)
     used = np.asarray(prepared.mask) & np.isfinite(run)
     left = np.linalg.norm((run - velocity)[used])
-    return float(left / max(np.linalg.norm(velocity[used]), 1e-300))
+    return float(left) / max(float(np.linalg.norm(velocity[used])), 1e-300)
 
 
 def _memoryless(model: Model) -> bool:

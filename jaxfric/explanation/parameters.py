@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from ..effects import wave
+from ..effects import Wave, wave
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..uncertainty import Estimate
@@ -38,8 +38,8 @@ def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[s
         values = [*now.alphas[n], *now.betas[n]]
         named = {
             p.name: Estimate(
-                jnp.asarray(value),
-                jnp.sqrt(jnp.asarray(matrix[place, place])),
+                np.float64(value),
+                np.float64(np.sqrt(matrix[place, place])),
                 spell(p.dimension, units),
                 freedom,
             )
@@ -63,7 +63,7 @@ def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
             jnp.asarray(values[i + 1]),
             jnp.asarray(matrix[i : i + 2, i : i + 2]),
         )
-        unit = named[name].unit
+        unit, pair = named[name].unit, Wave(*map(np.asarray, pair))
         found[f"amplitude{suffix}"] = Estimate(pair.amplitude, pair.amplitude_error, unit, freedom)
         found[f"phase{suffix}"] = Estimate(pair.phase, pair.phase_error, "rad", freedom)
     return found

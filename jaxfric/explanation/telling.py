@@ -101,13 +101,16 @@ def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) ->
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
 # part; of four times its size, sixteen times the power, something is missing, wherever.
 ROUGH = 4.0
+# Where the findings leave most of the mismatch, less will do.
+HALF_ROUGH = 1.5
 
 
 def _rough(found: Named, asked: Question) -> bool:
-    """Whether what is left is far from the noise that neighbouring rows show."""
+    """Whether what is left is far from the noise that neighbouring rows show, or most of it all."""
     error = verification.error(found.last, asked.evidence)
     floor = verification.noise(found.last, asked.evidence.target)
-    return error > ROUGH * floor and error > LINEARITY
+    most = bool(found.taken) and found.last.energy > 0.5 * found.base.energy
+    return error > (HALF_ROUGH if most else ROUGH) * floor and error > LINEARITY
 
 
 def _verdict(named: bool, before: list[Place], after: list[Place], rough: bool) -> str:
