@@ -17,7 +17,7 @@ ORDER = """
     small refine projections reduced compress uncertainty search
     weighing identified identification selection online fleet
     control plant prediction simulation scenario
-    explanation concealed documents glossary tabulate report export cli __main__
+    explanation concealed documents glossary tabulate proof report export cli __main__
 """.split()
 
 FILES = sorted(PACKAGE.rglob("*.py"))

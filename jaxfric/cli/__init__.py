@@ -112,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_export,
         _add_models,
         _add_effects,
+        _add_prove,
     ):
         add(commands)
     return parser
@@ -166,7 +167,7 @@ def _add_identify(commands) -> None:
     command.add_argument(
         "--plot", type=options.picture, metavar="OUT.png", help="draw it (extra: report)"
     )
-    _add_reading(command)
+    options.reading(command)
 
 
 def _add_explain(commands) -> None:
@@ -203,7 +204,7 @@ def _add_explain(commands) -> None:
     command.add_argument(
         "--save", type=options.output, metavar="MODEL.json", help="write the improved model"
     )
-    _add_reading(command)
+    options.reading(command)
 
 
 def _add_predict(commands) -> None:
@@ -213,7 +214,7 @@ def _add_predict(commands) -> None:
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="FILE", help="the recording")
     command.add_argument("-o", "--out", type=options.output, required=True, metavar="OUT.csv")
-    _add_reading(command)
+    options.reading(command)
 
 
 def _add_simulate(commands) -> None:
@@ -230,7 +231,7 @@ def _add_simulate(commands) -> None:
         help="pd:kp=,kd= | pid:kp=,ki=,kd= | cascade:kp=,kv= (each also limit=); "
         "without one the force column drives",
     )
-    _add_reading(command)
+    options.reading(command)
 
 
 def _add_export(commands) -> None:
@@ -275,26 +276,27 @@ def _add_effects(commands) -> None:
     )
 
 
-def _add_reading(command: argparse.ArgumentParser) -> None:
-    group = command.add_argument_group("how to read the file")
-    group.add_argument(
-        "--columns",
-        type=options.names,
-        default={},
-        metavar="ROLE=NAME,…",
-        help="for instance force=vir,position=qm",
+def _add_prove(commands) -> None:
+    command = _add(commands, "prove", "prove.run", "the concealed-effect benchmark")
+    command.add_argument(
+        "--cases", type=options.count, default=240, metavar="N", help="machines (default: 240)"
     )
-    group.add_argument(
-        "--scale",
-        type=options.factors,
-        default={},
-        metavar="ROLE=FACTOR,…",
-        help="for instance position=0.001",
+    command.add_argument(
+        "--seed", type=options.count, default=1, metavar="S", help="of the machines (default: 1)"
     )
-    group.add_argument(
-        "--units",
-        type=options.names,
-        default={},
-        metavar="force=N,position=m",
-        help="after scaling; they name, they do not convert",
+    command.add_argument(
+        "--jobs", type=options.count, default=1, metavar="K", help="processes (default: 1)"
+    )
+    command.add_argument(
+        "--size",
+        type=options.sizes,
+        default=(0.02, 0.30),
+        metavar="LOW:HIGH",
+        help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",
+    )
+    command.add_argument(
+        "--out",
+        default="jaxfric-proof",
+        metavar="FOLDER",
+        help="answers and report; what is there already is not done again",
     )

@@ -1,7 +1,7 @@
 """Values of the command's options, and the message of an error. Imports nothing heavy."""
 
 import math
-from argparse import ArgumentTypeError
+from argparse import ArgumentParser, ArgumentTypeError
 from pathlib import Path
 
 # Gains of each controller that `simulate` knows; `limit` bounds the force of any of them.
@@ -92,3 +92,49 @@ def picture(text: str) -> str:
         kinds = ", ".join(f".{kind}" for kind in PICTURES)
         raise ArgumentTypeError(f"{text}: pictures are written as {kinds}; use that suffix")
     return output(text)
+
+
+def count(text: str) -> int:
+    """A whole number from one."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise ArgumentTypeError(f"{text!r} is not a whole number from 1")
+    return value
+
+
+def sizes(text: str) -> tuple[float, float]:
+    """`low:high`, or one number for both; shares from over 0 to 1."""
+    low, _, high = text.partition(":")
+    limits = number(low), number(high or low)
+    if not 0 < limits[0] <= limits[1] <= 1:
+        raise ArgumentTypeError(f"{text!r} is not LOW:HIGH with 0 < LOW ≤ HIGH ≤ 1")
+    return limits
+
+
+def reading(command: ArgumentParser) -> None:
+    """Add the options that say how to read a file."""
+    group = command.add_argument_group("how to read the file")
+    group.add_argument(
+        "--columns",
+        type=names,
+        default={},
+        metavar="ROLE=NAME,…",
+        help="for instance force=vir,position=qm",
+    )
+    group.add_argument(
+        "--scale",
+        type=factors,
+        default={},
+        metavar="ROLE=FACTOR,…",
+        help="for instance position=0.001",
+    )
+    group.add_argument(
+        "--units",
+        type=names,
+        default={},
+        metavar="force=N,position=m",
+        help="after scaling; they name, they do not convert",
+    )

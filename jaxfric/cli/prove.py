@@ -1,0 +1,28 @@
+"""`jaxfric prove`: the concealed-effect benchmark."""
+
+from argparse import Namespace
+from pathlib import Path
+
+from .. import proof
+from ..io import write_text
+from . import _configure
+
+
+def run(arguments: Namespace) -> int:
+    """Do what is left of the cases, score all, print the short table, write the report."""
+    folder, size = Path(arguments.out), arguments.size
+    cases = proof.run(folder, arguments.cases, arguments.seed, size, arguments.jobs, _configure)
+    scores = proof.scores(folder, cases)
+    try:
+        pictures, missing = proof.draw(scores, folder), ""
+    except ValueError as error:
+        pictures, missing = [], f"; no pictures: {error}"
+    command = (
+        f"jaxfric prove --cases {arguments.cases} --seed {arguments.seed} "
+        f"--size {size[0]:g}:{size[1]:g}"
+    )
+    write_text(folder / "report.md", proof.report(scores, command, pictures))
+    print(proof.short(scores))
+    written = ", ".join(["report.md", *pictures, "sealed/", "answers/"])
+    print(f"\nWritten to {folder}: {written}{missing}")
+    return 0

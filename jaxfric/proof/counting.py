@@ -1,0 +1,126 @@
+"""Rates over the scored cases, each with its interval."""
+
+from collections.abc import Callable, Iterable, Sequence
+from statistics import NormalDist, median
+from typing import Any, NamedTuple
+
+from .scoring import Parameter, Score
+
+# Edges of the bins of power, in parts of the Coulomb level.
+EDGES = (0.0, 0.02, 0.05, 0.10, 0.20, float("inf"))
+NONE = "none"
+
+
+class Rate(NamedTuple):
+    """How many of how many."""
+
+    hits: int
+    total: int
+
+    @property
+    def share(self) -> float | None:
+        """Hits over total; `None` of none."""
+        return self.hits / self.total if self.total else None
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval of a binomial share (Wilson 1927)."""
+        if not self.total:
+            return 0.0, 1.0
+        z, n, p = NormalDist().inv_cdf(0.975), self.total, self.hits / self.total
+        middle, scale = p + z**2 / (2 * n), 1 + z**2 / n
+        reach = z * (p * (1 - p) / n + (z / (2 * n)) ** 2) ** 0.5
+        return (middle - reach) / scale, (middle + reach) / scale
+
+
+def rate(scores: Iterable[Score], holds: Callable[[Score], bool | None]) -> Rate:
+    """How many cases something holds of, out of those of which it can be said."""
+    said = [answer for answer in map(holds, scores) if answer is not None]
+    return Rate(sum(map(bool, said)), len(said))
+
+
+def middle(values: Iterable[float | None]) -> float | None:
+    """The median of what is there."""
+    there = [value for value in values if value is not None]
+    return median(there) if there else None
+
+
+def of_kind(scores: Sequence[Score], kind: str) -> list[Score]:
+    """The cases of one kind; one that went wrong counts, as a miss."""
+    return [score for score in scores if score.kind == kind]
+
+
+def binned(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
+    """Single effects by size."""
+    rows = []
+    for low, high in zip(EDGES[:-1], EDGES[1:], strict=True):
+        inside = [s for s in of_kind(scores, "single") if s.sizes and low <= s.sizes[0] < high]
+        text = f"{low:.0%} to {high:.0%}" if high < EDGES[-1] else f"{low:.0%} or more"
+        rows.append((text if low else f"below {high:.0%}", inside))
+    return [row for row in rows if row[1]]
+
+
+def confusion(scores: Sequence[Score]) -> tuple[list[str], list[str], list[list[int]]]:
+    """True effect by the one named first; names of rows and columns, and counts.
+
+    Single effects, those outside the library, and healthy machines, which are the row "none".
+    """
+    pairs = [
+        (s.effects[0] if s.effects else NONE, s.named[0] if s.named else NONE)
+        for s in scores
+        if s.kind != "pair" and s.error is None
+    ]
+    # A row beyond the diagonal only where something was drawn, a column only where it was named.
+    true = sorted({row for row, _ in pairs}, key=lambda name: (name == NONE, name))
+    named = sorted({name for pair in pairs for name in pair}, key=lambda n: (n == NONE, n))
+    counts = [[pairs.count((row, column)) for column in named] for row in true]
+    return true, named, counts
+
+
+def parameters(scores: Sequence[Score]) -> list[Parameter]:
+    """Of all effects that were rightly named."""
+    return [p for s in scores for p in s.parameters if p.effect in s.effects]
+
+
+def covered(found: Iterable[Parameter]) -> Rate:
+    """How often the 95 % interval held the true value."""
+    said = [p.held for p in found if p.held is not None]
+    return Rate(sum(said), len(said))
+
+
+def summary(scores: Sequence[Score]) -> dict[str, Any]:
+    """The numbers of the short table: label to a rate, or to a median."""
+    healthy, single, pair, outside = (
+        of_kind(scores, kind) for kind in ("healthy", "single", "pair", "outside")
+    )
+    known = parameters(scores)
+    return {
+        "nothing concealed: called consistent": rate(healthy, lambda s: s.exact),
+        "nothing concealed: something named": rate(healthy, lambda s: bool(s.named)),
+        "one effect: named exactly": rate(single, lambda s: s.exact),
+        "one effect: named first": rate(single, lambda s: s.named[:1] == s.effects),
+        "one effect: among the named": rate(single, lambda s: s.among),
+        "one effect: named or declared confusable": rate(single, lambda s: s.within),
+        "one effect: its place found": rate(single, located),
+        "two effects: both and nothing else": rate(pair, lambda s: s.exact),
+        "two effects: both named": rate(pair, lambda s: s.among),
+        "two effects: at least one named": rate(pair, lambda s: s.hits > 0),
+        "outside the library: not called consistent": rate(
+            outside, lambda s: s.error is None and s.verdict != "consistent"
+        ),
+        "outside the library: not called explained": rate(
+            outside, lambda s: s.error is None and s.verdict != "explained"
+        ),
+        "parameters: median relative error": middle(p.error for p in known),
+        "parameters: 95 % interval held the truth": covered(known),
+        "held-out error: median part of the oracle's reduction": middle(
+            s.reached for s in (*single, *pair)
+        ),
+        "seconds a case, median": middle(s.seconds for s in scores),
+        "cases that went wrong": rate(scores, lambda s: s.error is not None),
+    }
+
+
+def located(score: Score) -> bool | None:
+    """Whether the place of every effect was found; a case that went wrong is a miss."""
+    return False if score.error is not None else score.located

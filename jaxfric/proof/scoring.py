@@ -1,0 +1,148 @@
+"""Scoring: the sealed truth of each case against its answer."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..effects import EFFECTS
+from ..uncertainty import COSINES, student_quantile
+from .planning import Case
+from .trials import ANSWERS, SEALED, path, read
+
+# What an oracle that knows the truth removes of the error must be more than the chance of a
+# held-out recording, for the part of it that was reached to be a number of any meaning.
+LEAST_REDUCTION = 0.1
+
+
+class Parameter(NamedTuple):
+    """A parameter of a rightly named effect: both values, and whether the 95 % interval held it.
+
+    `held` is `None` where no standard error was given.
+    """
+
+    effect: str
+    name: str
+    true: float
+    found: float
+    held: bool | None
+
+    @property
+    def error(self) -> float:
+        """Relative to the true value."""
+        return abs(self.found - self.true) / abs(self.true)
+
+
+class Score(NamedTuple):
+    """One case, scored.
+
+    - `name`, `kind`, `seed`, `effects` as planned; `sizes`: of each effect, in parts of Coulomb.
+    - `error`: why there is no answer; the rest is then empty.
+    - `verdict`; `named`: the findings, strongest first; `alike`: all that they are said to be
+      confusable with.
+    - `exact`: the findings are the truth and nothing else; `among`: the truth is among them;
+      `within`: each true effect is named, or declared confusable with a named one.
+    - `located`: one of the coordinates that the catalogue gives each true effect is among those
+      on which structure was found; `None` for effects outside the library.
+    - `before`, `after`, `oracle`: held-out force errors.
+    - `parameters` that truth and finding both have; `seconds` that `explain` took; `code`.
+    """
+
+    name: str
+    kind: str
+    seed: int
+    effects: tuple[str, ...]
+    sizes: tuple[float, ...] = ()
+    error: str | None = None
+    verdict: str = ""
+    named: tuple[str, ...] = ()
+    alike: tuple[str, ...] = ()
+    exact: bool = False
+    among: bool = False
+    within: bool = False
+    located: bool | None = None
+    before: float | None = None
+    after: float | None = None
+    oracle: float | None = None
+    parameters: tuple[Parameter, ...] = ()
+    seconds: float | None = None
+    code: str | None = None
+
+    @property
+    def reached(self) -> float | None:
+        """Part of the oracle's reduction of the held-out error; `None` where that is too small."""
+        if None in (self.before, self.after, self.oracle):
+            return None
+        possible = self.before - self.oracle
+        if possible < LEAST_REDUCTION * self.before:
+            return None
+        return (self.before - self.after) / possible
+
+    @property
+    def hits(self) -> int:
+        """How many of the true effects are named."""
+        return len(set(self.effects) & set(self.named))
+
+
+def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
+    """Open what was sealed, and score every case that has an answer."""
+    found = []
+    for case in cases:
+        if path(folder, ANSWERS, case).is_file():
+            truth = path(folder, SEALED, case)
+            sealed = read(truth) if truth.is_file() else None
+            found.append(score(case, sealed, read(path(folder, ANSWERS, case))))
+    return found
+
+
+def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any]) -> Score:
+    """One case; `sealed` is `None` where its machine could not be drawn."""
+    first = Score(case.name, case.kind, case.seed, case.effects, code=answer.get("code"))
+    if answer["error"] is not None or sealed is None:
+        return first._replace(error=answer["error"] or "the sealed truth is not there")
+    truth, findings = sealed["truth"], answer["findings"]
+    named = tuple(finding["effect"] for finding in findings)
+    alike = tuple({name: 0 for finding in findings for name in finding["confusable_with"]})
+    wanted, held = set(case.effects), answer["fit"]["holdout_force_error"] or {}
+    return first._replace(
+        sizes=tuple(truth[name]["size"] for name in case.effects),
+        verdict=answer["verdict"],
+        named=named,
+        alike=alike,
+        # The same effect named twice, with two harmonics for one, is the same name.
+        exact=set(named) == wanted and (bool(wanted) or answer["verdict"] == "consistent"),
+        among=wanted <= set(named),
+        within=wanted <= {*named, *alike},
+        located=_located(case.effects, answer["where"]),
+        before=held.get("before"),
+        after=held.get("after"),
+        oracle=answer["oracle"],
+        parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
+        seconds=answer["seconds"],
+    )
+
+
+def _located(effects: Sequence[str], where: Sequence[Mapping[str, Any]]) -> bool | None:
+    if not effects or any(name not in EFFECTS for name in effects):
+        return None
+    found = {place["coordinate"] for place in where}
+    return all(
+        found & {name.removesuffix("_lines") for name in EFFECTS[effect].coordinates}
+        for effect in effects
+    )
+
+
+def _parameters(finding: Mapping[str, Any], truth: Mapping[str, Any]) -> Iterator[Parameter]:
+    """Those whose names coincide; `name+` and `name-` are both compared with a common `name`."""
+    effect = finding["effect"]
+    values = truth.get(effect, {})
+    for name, estimate in finding["parameters"].items():
+        true = values.get(name, values.get(name.rstrip("+-")))
+        if not isinstance(true, int | float) or true == 0 or name.endswith("phase"):
+            continue
+        found, spread = estimate.get("value"), estimate.get("standard_error")
+        if found is None or not math.isfinite(found):
+            continue
+        reach = None if spread is None else student_quantile(0.975, COSINES) * spread
+        held = None if reach is None else bool(abs(found - true) <= reach)
+        yield Parameter(effect, name, float(true), float(found), held)

@@ -1,0 +1,139 @@
+"""One case: the truth sealed, the question answered blind, the oracle asked afterwards."""
+
+import dataclasses
+import functools
+import hashlib
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..concealed import Machine, Run, draw, record
+from ..documents import to_json
+from ..explanation import explain
+from ..explanation.evidence import gather
+from ..explanation.question import ask, from_position
+from ..explanation.verification import residual
+from ..io import write_text
+from ..models import named
+from ..recording import Recording
+from .planning import Case
+
+SEALED, ANSWERS = "sealed", "answers"
+# Of an explanation, what is kept: not the model, nor what could not have been seen.
+KEPT = ("verdict", "where", "findings", "fit")
+# Nobody can know the pushes of the held-out run from those of the other.
+UNREPEATED = frozenset({"disturbance_pulses"})
+
+
+def path(folder: Path, part: str, case: Case) -> Path:
+    """The file of a case in a part of the folder."""
+    return folder / part / f"{case.name}.json"
+
+
+def trial(case: Case, folder: Path) -> None:
+    """Do one case, and write its answer; whatever goes wrong is written as its answer too."""
+    code = fingerprint()
+    try:
+        machine = draw(case.seed, case.effects, case.size)
+        write_text(path(folder, SEALED, case), to_json(sealed(case, machine)))
+        run = record(machine)
+        recording = _nameless(run.recording, case)
+        answer = answered(recording, machine.baseline, _nameless(run.holdout, case))
+        answer["oracle"] = oracle(run, machine) if machine.effects else None
+    except Exception as error:  # a proof of hundreds of cases outlives any one of them
+        answer = failed(f"{type(error).__name__}: {error}")
+    answer |= {"case": case.name, "code": code}
+    write_text(path(folder, ANSWERS, case), to_json(answer))
+
+
+def failed(text: str) -> dict[str, Any]:
+    """The answer of a case that went wrong."""
+    return {"error": text.strip(), "seconds": None}
+
+
+def sealed(case: Case, machine: Machine) -> dict[str, Any]:
+    """What is true of a case."""
+    truth = {name: _plain(values) for name, values in machine.truth.items()}
+    return {
+        "case": case.name,
+        "kind": case.kind,
+        "seed": case.seed,
+        "effects": list(case.effects),
+        "size": list(case.size),
+        "coulomb": machine.coulomb,
+        "truth": truth,
+    }
+
+
+def answered(recording: Recording, baseline: str, holdout: Recording) -> dict[str, Any]:
+    """What `explain` says of two recordings, and how long it takes; it is told nothing else."""
+    start = time.perf_counter()
+    found = explain(recording, baseline, holdout)
+    seconds = time.perf_counter() - start
+    document = found.to_dict()
+    kept = {key: document[key] for key in KEPT}
+    facts = {"baseline": baseline, "recording": document["recording"], "seconds": seconds}
+    return {"error": None, **kept, **facts}
+
+
+def oracle(run: Run, machine: Machine) -> float | None:
+    """The held-out force error that would be left if the concealed force were known exactly.
+
+    The true concealed force is subtracted from the measured force of both recordings; the baseline
+    is fitted to what is left of the first, and predicts what is left of the second with nothing
+    refitted. The norm of that residual over the norm of the held-out force as measured is the
+    error, over the rows, and by the kernel and the alignment, that `explain` chooses for the
+    recordings without the concealed force. `None` where no one could know the held-out force.
+    """
+    if UNREPEATED & set(machine.effects):
+        return None
+    structure = named(machine.baseline)
+    clean = _without(run.recording, run.hidden)
+    known = ask(clean, _without(run.holdout, run.hidden_holdout), structure)
+    measured = gather(from_position(run.holdout), known.evidence.width, known.delay).target
+    return _norm(residual(known.base, known.held)) / _norm(measured)
+
+
+def _norm(values: np.ndarray) -> float:
+    return float(np.sqrt(values @ values))
+
+
+def _without(recording: Recording, hidden: dict[str, np.ndarray]) -> Recording:
+    force = np.asarray(recording.force)
+    rest = force - sum(hidden.values(), np.zeros_like(force))
+    return dataclasses.replace(recording, force=rest)
+
+
+def _nameless(recording: Recording, case: Case) -> Recording:
+    """Its name would tell the seed."""
+    return dataclasses.replace(recording, source=f"case {case.name}")
+
+
+def _plain(value: Any) -> Any:
+    """Numbers of numpy as those of Python."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+@functools.cache
+def fingerprint() -> str:
+    """Of the package's source, as a process finds it at its first case.
+
+    Answers of different ones are not of one proof.
+    """
+    digest = hashlib.sha256()
+    package = Path(__file__).parents[1]
+    for file in sorted(package.rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def read(file: Path) -> dict[str, Any]:
+    """A file that a proof has written."""
+    return json.loads(file.read_text(encoding="utf-8"))

@@ -1,0 +1,342 @@
+"""The proof: its plan, its blindness, its scores."""
+
+import dataclasses
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from jaxfric import proof
+from jaxfric.cli import main
+from jaxfric.concealed import NAMES, OUTSIDE
+from jaxfric.effects import effect
+from jaxfric.proof import counting, running, scoring, trials
+
+RANGE = (0.02, 0.3)
+
+
+def case(*effects, kind="single"):
+    return proof.Case("00001", kind, 7, effects, RANGE)
+
+
+def sealed(**truth):
+    return {"truth": {name: {"size": 0.1, **values} for name, values in truth.items()}}
+
+
+def finding(name, *alike, **parameters):
+    values = {
+        key: {"value": value, "standard_error": error, "unit": "N"}
+        for key, (value, error) in parameters.items()
+    }
+    return {"effect": name, "confusable_with": list(alike), "parameters": values}
+
+
+def answer(*findings, verdict="explained", where=(), before=0.10, after=0.05, oracle=0.04):
+    return {
+        "error": None,
+        "verdict": verdict,
+        "where": [{"coordinate": name} for name in where],
+        "findings": list(findings),
+        "fit": {"holdout_force_error": {"before": before, "after": after}},
+        "oracle": oracle,
+        "seconds": 3.0,
+        "code": "abc",
+    }
+
+
+# The plan
+
+
+def test_the_plan_is_the_seeds_and_longer_ones_go_on_from_it():
+    first = proof.plan(30, 5, RANGE)
+    assert first == proof.plan(60, 5, RANGE)[:30]
+    assert [c.seed for c in first] != [c.seed for c in proof.plan(30, 6, RANGE)]
+    assert len({c.seed for c in first}) == 30
+
+
+def test_the_plan_is_balanced():
+    cases = proof.plan(24 * len(NAMES), 1, RANGE)
+    kinds = Counter(c.kind for c in cases)
+    count = len(NAMES)
+    assert kinds == {
+        "healthy": 8 * count, "single": 12 * count, "pair": 3 * count, "outside": count
+    }  # fmt: skip
+    assert all(c.effects == () for c in cases if c.kind == "healthy")
+    singles = Counter(c.effects[0] for c in cases if c.kind == "single")
+    assert singles == dict.fromkeys(NAMES, 12)
+    outside = Counter(c.effects[0] for c in cases if c.kind == "outside")
+    assert set(outside) == set(OUTSIDE) and max(outside.values()) - min(outside.values()) <= 1
+    members = Counter(name for c in cases if c.kind == "pair" for name in c.effects)
+    assert set(members) == set(NAMES) and max(members.values()) <= 2 * min(members.values())
+
+
+def test_no_pair_is_declared_confusable():
+    for c in proof.plan(600, 2, RANGE):
+        if c.kind == "pair":
+            first, second = c.effects
+            assert first != second
+            assert second not in effect(first).confusable_with
+            assert first not in effect(second).confusable_with
+
+
+@pytest.mark.parametrize("wrong", [(0, 1, RANGE), (3, -1, RANGE), (3, 1, (0.3, 0.02))])
+def test_a_plan_that_cannot_be_is_refused(wrong):
+    with pytest.raises(ValueError, match="give"):
+        proof.plan(*wrong)
+
+
+# Scores
+
+
+def test_right_and_nothing_else_is_exact():
+    found = scoring.score(
+        case("cogging"), sealed(cogging={}), answer(finding("cogging"), where=("position",))
+    )
+    assert found.exact and found.among and found.within and found.located
+    assert found.reached == pytest.approx(0.05 / 0.06)
+
+
+def test_one_name_too_many_is_not_exact():
+    found = scoring.score(
+        case("cogging"), sealed(cogging={}), answer(finding("spring"), finding("cogging"))
+    )
+    assert not found.exact and found.among and found.within
+    assert found.located is False
+
+
+def test_a_declared_doubt_is_within_the_class_only():
+    found = scoring.score(case("cogging"), sealed(cogging={}), answer(finding("spring", "cogging")))
+    assert not found.exact and not found.among and found.within
+    undeclared = answer(finding("spring", "end_stop"))
+    assert not scoring.score(case("cogging"), sealed(cogging={}), undeclared).within
+
+
+def test_both_of_a_pair_are_needed():
+    pair = case("cogging", "stribeck", kind="pair")
+    truth = sealed(cogging={}, stribeck={})
+    one = scoring.score(pair, truth, answer(finding("stribeck"), where=("velocity",)))
+    assert (one.exact, one.among, one.within, one.hits, one.located) == (
+        False, False, False, 1, False
+    )  # fmt: skip
+    both = answer(finding("stribeck"), finding("cogging"), where=("velocity", "position"))
+    assert scoring.score(pair, truth, both).exact
+    assert scoring.score(pair, truth, both).located
+
+
+@pytest.mark.parametrize(
+    ("said", "right"),
+    [
+        (answer(verdict="consistent", oracle=None), True),
+        (answer(verdict="unexplained", oracle=None), False),
+        (answer(finding("cogging"), oracle=None), False),
+    ],
+)
+def test_a_healthy_machine_is_consistent_or_wrong(said, right):
+    assert scoring.score(case(kind="healthy"), sealed(), said).exact is right
+
+
+def test_parameters_are_compared_where_the_names_coincide():
+    truth = sealed(stribeck={"stribeck_force": 2.0, "shape": "gaussian", "phase": 1.0})
+    said = finding(
+        "stribeck",
+        **{"stribeck_force+": (2.2, 0.1), "stribeck_force-": (2.6, 0.1), "phase": (3.0, 0.1)},
+        other=(1.0, 0.1),
+    )
+    found = scoring.score(case("stribeck"), truth, answer(said, finding("spring", k=(1.0, 0.1))))
+    assert [p.name for p in found.parameters] == ["stribeck_force+", "stribeck_force-"]
+    # Eight degrees of freedom: 2.31 standard errors.
+    assert [p.held for p in found.parameters] == [True, False]
+    assert [p.error for p in found.parameters] == pytest.approx([0.1, 0.3])
+
+
+def test_where_the_oracle_gains_nothing_no_share_is_made_of_it():
+    said = answer(finding("cogging"), before=0.1, after=0.05, oracle=0.095)
+    assert scoring.score(case("cogging"), sealed(cogging={}), said).reached is None
+
+
+def test_a_case_that_went_wrong_is_a_miss_in_every_rate():
+    wrong = scoring.score(case("cogging"), None, trials.failed("it broke") | {"code": None})
+    table = proof.summary([wrong])
+    assert wrong.error == "it broke"
+    for label, value in table.items():
+        if label.startswith("one effect"):
+            assert (value.hits, value.total) == (0, 1), label
+    assert table["cases that went wrong"].hits == 1
+
+
+def test_the_interval_of_a_share():
+    low, high = proof.Rate(0, 60).interval
+    assert low == pytest.approx(0, abs=1e-12) and high == pytest.approx(0.0602, abs=1e-3)
+    assert proof.Rate(0, 0).share is None
+
+
+def some_scores():
+    right = scoring.score(case("cogging"), sealed(cogging={}), answer(finding("cogging")))
+    wrong = scoring.score(case("cogging"), sealed(cogging={}), answer(finding("spring", "cogging")))
+    quiet = answer(verdict="consistent", oracle=None)
+    healthy = scoring.score(case(kind="healthy"), sealed(), quiet)
+    return [right, wrong, wrong._replace(sizes=(0.03,)), healthy]
+
+
+def test_confusion_and_power():
+    true, named, counts = counting.confusion(some_scores())
+    assert (true, named) == (["cogging", "none"], ["cogging", "spring", "none"])
+    assert counts == [[1, 2, 0], [0, 0, 1]]
+    assert [(name, len(some)) for name, some in counting.binned(some_scores())] == [
+        ("2% to 5%", 1), ("10% to 20%", 2)
+    ]  # fmt: skip
+
+
+def test_the_report_says_what_was_missed(tmp_path):
+    scores = some_scores()
+    text = proof.report(scores, "jaxfric prove", proof.draw(scores, tmp_path))
+    assert "| one effect: named exactly | 33.3%" in text
+    assert text.count("explained: spring (declared confusable)") == 2
+    assert "two states" not in text and "abc" in text
+    assert "**The answers are of 2 states" in proof.report(
+        [scores[0], scores[1]._replace(code="def")], "jaxfric prove"
+    )
+    assert {file.name for file in tmp_path.iterdir()} == {"confusion.png", "power.png"}
+    assert "one effect: named exactly" in proof.short(scores)
+
+
+# Running
+
+
+def written(folder, cases):
+    for c in cases:
+        trials.path(folder, trials.ANSWERS, c).parent.mkdir(parents=True, exist_ok=True)
+        quiet = answer(verdict="consistent", oracle=None)
+        trials.path(folder, trials.ANSWERS, c).write_text(json.dumps(quiet))
+
+
+def test_answers_that_are_there_are_not_repeated(tmp_path, monkeypatch):
+    done = []
+
+    def pool(cases, folder, *_):
+        done.append([c.name for c in cases])
+        written(folder, cases)
+        return False
+
+    monkeypatch.setattr(running, "_pool", pool)
+    proof.run(tmp_path, 3, 1, RANGE)
+    proof.run(tmp_path, 3, 1, RANGE)
+    proof.run(tmp_path, 5, 1, RANGE)
+    assert done == [["00001", "00002", "00003"], ["00004", "00005"]]
+    with pytest.raises(ValueError, match="seed 1"):
+        proof.run(tmp_path, 3, 2, RANGE)
+
+
+def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(ValueError, match="holds no proof"):
+        proof.run(tmp_path, 3, 1, RANGE)
+    assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_process_that_dies_costs_its_own_case_only(tmp_path, monkeypatch):
+    def pool(cases, folder, jobs, *_):
+        good = [c for c in cases if c.name != "00002"]
+        written(folder, good if jobs > 1 or good == cases else cases[: cases.index(deadly(cases))])
+        return len(good) < len(cases)
+
+    def deadly(cases):
+        return next(c for c in cases if c.name == "00002")
+
+    monkeypatch.setattr(running, "_pool", pool)
+    cases = proof.run(tmp_path, 4, 1, RANGE, jobs=2)
+    errors = [score.error for score in proof.scores(tmp_path, cases)]
+    assert errors[1] == "the process died"
+    # The others have answers, if no sealed files: nothing was drawn here.
+    assert len(errors) == 4
+
+
+WATCHED = []
+
+
+def _watch(event, arguments):
+    if WATCHED and event == "open":
+        WATCHED[-1].append(str(arguments[0]))
+
+
+@pytest.fixture(scope="session")
+def hook():
+    """Every file that Python opens, by whatever way; a hook stays for good."""
+    sys.addaudithook(_watch)
+
+
+@pytest.fixture
+def quick(monkeypatch, hook, tmp_path):
+    """Drawing and recording without a simulation; what was opened from explaining on."""
+    opened = []
+
+    def explain(recording, baseline, holdout):
+        assert (tmp_path / trials.SEALED / "00001.json").is_file()
+        opened.append(("explained", recording.source, baseline, holdout.source))
+        WATCHED.append(opened)
+        raise ValueError("too short")
+
+    machine = Drawn({"cogging": {"size": np.float64(0.1), "amplitudes": [np.float64(2.0)]}})
+    monkeypatch.setattr(trials, "draw", lambda *_: machine)
+    monkeypatch.setattr(trials, "record", lambda _: Logs(Log("machine 7"), Log("machine 7")))
+    monkeypatch.setattr(trials, "explain", explain)
+    yield opened
+    WATCHED.clear()
+
+
+@dataclasses.dataclass(frozen=True)
+class Log:
+    source: str
+
+
+@dataclasses.dataclass(frozen=True)
+class Logs:
+    recording: Log
+    holdout: Log
+
+
+@dataclasses.dataclass(frozen=True)
+class Drawn:
+    truth: dict
+    effects: tuple = ("cogging",)
+    baseline: str = "gaussian"
+    coulomb: float = 1.0
+
+
+def test_the_truth_is_sealed_first_and_explain_is_told_nothing(tmp_path, quick):
+    for part in (trials.SEALED, trials.ANSWERS):
+        (tmp_path / part).mkdir()
+    trials.trial(case("cogging"), tmp_path)
+    assert quick[0] == ("explained", "case 00001", "gaussian", "case 00001")
+    assert [file for file in quick[1:] if f"/{trials.ANSWERS}/" in file]
+    assert not [file for file in quick[1:] if f"/{trials.SEALED}/" in file]
+    truth = trials.read(tmp_path / trials.SEALED / "00001.json")
+    assert truth["truth"] == {"cogging": {"size": 0.1, "amplitudes": [2.0]}}
+    said = trials.read(tmp_path / trials.ANSWERS / "00001.json")
+    assert said["error"] == "ValueError: too short"
+    assert "cogging" not in json.dumps(said)
+    row = proof.scores(tmp_path, [case("cogging")])[0]
+    assert row.error == "ValueError: too short" and not row.within
+
+
+@pytest.mark.parametrize("option", [("--cases", "0"), ("--size", "0.3:0.1"), ("--size", "a")])
+def test_options_that_make_no_sense(option, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(["prove", *option])
+    assert stop.value.code == 2
+    assert option[0] in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_two_real_cases(tmp_path, capsys):
+    folder = tmp_path / "proof"
+    command = ["prove", "--cases", "2", "--seed", "901", "--size", "0.2", "--out", str(folder)]
+    assert main(command) == 0
+    assert "cases that went wrong" in capsys.readouterr().out
+    assert {file.name for file in Path(folder).iterdir()} >= {"report.md", "sealed", "answers"}
+    answers = [trials.read(file) for file in sorted((folder / "answers").iterdir())]
+    assert [a["error"] for a in answers] == [None, None]
+    assert answers[0]["oracle"] is None and answers[1]["oracle"] > 0
