@@ -294,9 +294,5 @@ def _add_prove(commands) -> None:
         metavar="LOW:HIGH",
         help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",
     )
-    command.add_argument(
-        "--out",
-        default="jaxfric-proof",
-        metavar="FOLDER",
-        help="answers and report; what is there already is not done again",
-    )
+    text = "answers and report; answers that are there stay"
+    command.add_argument("--out", default="jaxfric-proof", metavar="FOLDER", help=text)
