@@ -3,6 +3,9 @@
 import os
 from pathlib import Path
 
+# One worker a core: more threads for small matrices would only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import jax
 import pytest
 from hypothesis import settings

@@ -85,7 +85,15 @@ def test_nothing_is_missing_where_nothing_is(healthy):
     assert 0 < sizes["cogging"] < 0.1 * COULOMB
 
 
-@pytest.mark.parametrize("effect", CASES)
+@pytest.mark.parametrize(
+    "effect",
+    ["cogging", "friction_step"]
+    + [
+        pytest.param(name, marks=pytest.mark.slow)
+        for name in list(CASES)[1:]
+        if name != "friction_step"
+    ],
+)
 def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
     term, alpha, beta = CASES[effect]
     run, held = (planted(r, term, alpha, beta) for r in healthy)
@@ -131,6 +139,7 @@ def test_a_wrong_value_is_told_from_missing_physics(healthy):
     assert right.verdict == "consistent"
 
 
+@pytest.mark.slow
 def test_another_simulator_is_compared_without_a_model(healthy):
     x, v = set_point(0)
     machine = models.from_parameters(models.gaussian(), PARAMETERS)
@@ -160,6 +169,7 @@ def test_the_document_holds_what_the_contract_says(healthy):
     assert float(again.parameters["pitch"]) == pytest.approx(0.01, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_models_run_forward_before_and_after(healthy):
     term, alpha, beta = CASES["spring"]
     run = planted(healthy[0], term, tuple(5 * a for a in alpha), beta)
