@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxfric as jf
-from jaxfric import reduced
+from jaxfric import reduced, refine
 from jaxfric.identified import result_names
 from jaxfric.projections import Rows
 from jaxfric.search import search
@@ -148,7 +148,7 @@ def quadratic_well(centre):
 def test_refinement_stays_in_its_cell_and_never_worsens(centre):
     residuals, cell = quadratic_well([centre]), jnp.asarray([0.05])
     start = jnp.asarray([round(float(np.clip(centre, 0, 1)) / 0.05) * 0.05])
-    found, converged = reduced.refine(residuals, start, cell)
+    found, converged = refine.refine(residuals, start, cell)
     assert bool(converged)
     assert 0 <= float(found[0]) <= 1 and abs(float((found - start)[0])) <= 0.05 + 1e-15
     cost = [float(jnp.sum(residuals(x) ** 2)) for x in (found, start)]
