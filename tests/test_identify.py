@@ -45,7 +45,15 @@ def recording(model, noise=0.0, seed=0, **arguments):
     return dataclasses.replace(bare, force=force)
 
 
-@pytest.mark.parametrize("name", ["coulomb-viscous", "gaussian", "exponential"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "coulomb-viscous",
+        "gaussian",
+        "exponential",
+        pytest.param("lorentzian", marks=pytest.mark.slow),
+    ],
+)
 @pytest.mark.parametrize("projection", [jf.ClosedWindows(), jf.WeakForm(16)])
 def test_recovers_a_known_machine(name, projection):
     model = machine(name)
