@@ -5,18 +5,16 @@ orthonormalised once and projected out of the force and out of each bump, so tha
 L(β) = |r|² − hᵀ D⁻¹ h is a difference that has lost nothing to the large common part.
 """
 
-import math
 from collections.abc import Callable
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 from . import small
-from .refine import BoxGaussNewton
+from .refine import descend
 from .terms.base import AbstractTerm, Directional, Sum
 
 # A tile of grid points times samples stays below this many numbers, so that it lives in the cache
@@ -130,7 +128,11 @@ class Moments(eqx.Module):
     whole: Float[Array, " R"]
 
     def costs(self, bumps: Float[Array, "B J"]) -> Float[Array, "R B"]:
-        """L of each bump and weighting, eq. (17), N²·s.
+        """L of each bump and weighting, eq. (17), N²·s."""
+        return self.whole[:, None] - self.gains(bumps)
+
+    def gains(self, bumps: Float[Array, "B J"]) -> Float[Array, "R B"]:
+        """What each bump takes off the cost, hᵀ D⁻¹ h less its part without the bump, N²·s.
 
         What all weightings can explain is first taken off the bump itself, so that the difference
         e·e − |Qᵀe|² does not cancel where the bump is nearly constant or straight.
@@ -149,8 +151,7 @@ class Moments(eqx.Module):
         most = jnp.sum(self.weights, axis=1)[:, None] * jnp.max(some**2, axis=1)[None, :]
         eps = 1e3 * jnp.finfo(rest.dtype).eps
         visible = (rest > eps * size) & (rest > eps**2 * most)
-        gain = jnp.where(visible, products[:, -1] ** 2 / jnp.where(visible, rest, 1.0), 0.0)
-        return self.whole[:, None] - gain
+        return jnp.where(visible, products[:, -1] ** 2 / jnp.where(visible, rest, 1.0), 0.0)
 
 
 def moments(
@@ -255,25 +256,20 @@ def decode(
     return jnp.where(jnp.asarray(logarithmic), positive * ratio**unit, linear)
 
 
-def refine(
-    residuals: Callable[[Float[Array, " d"]], Float[Array, " J"]],
-    start: Float[Array, " d"],
-    cell: Float[Array, " d"],
-) -> tuple[Float[Array, " d"], Bool[Array, ""]]:
-    """The minimiser near a grid point, inside the unit cube; no step is longer than a grid cell.
+def refine_bump(
+    bump: Callable[[Float[Array, " d"]], Float[Array, " J"]],
+    rows: Moments,
+    start: Float[Array, "R d"],
+    cell: Float[Array, "R d"],
+) -> tuple[Float[Array, "R d"], Bool[Array, " R"]]:
+    """The minimisers of one bump's cost, one for each weighting, on the places of `rows`.
 
-    **Returns:** the refined point, never worse than `start`, and whether it converged.
+    **Arguments:** `start`, `cell`: as for [`refine`][jaxfric.refine.refine], `(R, d)`.
     """
-    tolerance = math.sqrt(float(jnp.finfo(start.dtype).eps)) * 1e-4
-    solver = BoxGaussNewton(rtol=0.0, atol=tolerance)
-    box = {"lower": jnp.zeros_like(start), "upper": jnp.ones_like(start), "reach": cell}
-    found: optx.Solution = optx.least_squares(
-        lambda y, _: residuals(y),
-        solver,
-        start,
-        options=box,
-        max_steps=60,
-        throw=False,
-        adjoint=optx.RecursiveCheckpointAdjoint(),
-    )
-    return found.value, found.result == optx.RESULTS.successful
+
+    def side(against, weights, whole, start, cell):
+        one = Moments(rows.shared, rows.dual, against[None], weights[None], whole[None])
+        return descend(lambda unit: -one.gains(bump(unit)[None, :])[0, 0], start, cell)
+
+    items = (rows.against, rows.weights, rows.whole, start, cell)
+    return jax.lax.map(lambda item: side(*item), items)

@@ -1,5 +1,6 @@
 """β of the least reduced cost: the grid in one batched call, the refinement, its derivative."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -7,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import compress, reduced, small
+from . import compress, reduced, refine, small
 from .projections import Rows
 from .recording import Recording
 from .terms.base import AbstractTerm, Directional, Sum, summands
@@ -50,14 +51,23 @@ def search(
     problem = _Problem(term, recording, rows, box, logarithmic)
     frozen = jax.lax.stop_gradient(problem)
     sides = _sides(term)
-    if sides is None:
-        start, cell = _grid_whole(frozen, grid)
-    else:
-        start, cell = _grid_sides(sides, frozen, grid)
-    unit, converged = reduced.refine(frozen.residuals(), start, cell)
+    best = _grid_whole(frozen, grid) if sides is None else _grid_sides(sides, frozen, grid)
+    unit, converged = _refine(frozen, best)
     unit = _implicit(jax.lax.stop_gradient(unit), problem)
     border = jnp.any((unit <= 0) | (unit >= 1))
     return Found(reduced.decode(unit, box, logarithmic), converged, border)
+
+
+class _Best(NamedTuple):
+    """The best grid point and the cell around it, in the unit cube.
+
+    Where each direction is one bump's own problem, `sides` holds the bump, its moments, and
+    whether they stand on nodes instead of the samples.
+    """
+
+    start: Float[Array, " d"]
+    cell: Float[Array, " d"]
+    sides: tuple[Callable, reduced.Moments, bool] | None = None
 
 
 class _Problem(eqx.Module):
@@ -94,6 +104,26 @@ class _Problem(eqx.Module):
             return reduced.residual(basis, target, columns)
 
         return residuals
+
+
+def _refine(problem: _Problem, best: _Best):
+    """The minimiser near the best grid point, and whether the refinement converged.
+
+    What nodes say is checked on the samples: the result is never worse there than the grid's.
+    """
+    if best.sides is None:
+        return refine.refine(problem.residuals(), best.start, best.cell)
+    bump, moments, on_nodes = best.sides
+    pair = best.start.reshape(2, -1), best.cell.reshape(2, -1)
+    unit, converged = reduced.refine_bump(bump, moments, *pair)
+    unit, converged = unit.reshape(-1), jnp.all(converged)
+    if not on_nodes:
+        return unit, converged
+    residuals = problem.residuals()
+    points = jnp.stack([best.start, unit])
+    before, after = jax.lax.map(lambda point: jnp.sum(residuals(point) ** 2), points)
+    fine = after <= before * (1 + 64 * jnp.finfo(unit.dtype).eps)
+    return jnp.where(fine, unit, best.start), converged & fine
 
 
 @jax.custom_jvp
@@ -134,7 +164,7 @@ def _grid_whole(problem: _Problem, points):
     def columns(unit):
         return root[:, None] * problem.columns(bumps, unit)
 
-    return _best(grid, reduced.general_grid_costs(columns, grid, basis, target))
+    return _Best(*_best(grid, reduced.general_grid_costs(columns, grid, basis, target)))
 
 
 def _grid_sides(sides, problem: _Problem, points):
@@ -151,18 +181,19 @@ def _grid_sides(sides, problem: _Problem, points):
     target = rows.target - rows.offset(problem.term, recording)
     bumps, count = reduced.part(inner, True), len(inner.nonlinear)
     grid = reduced.grid_points(count, points, roots.dtype)
-    one = summands(bumps)
+    one, exact = summands(bumps), None
     if len(bumps.affine) > 1:
         costs = _general_sides(problem, bumps, grid, columns, target, roots)
     elif rows.sampled and isinstance(one[0], AbstractBump) and _has_constant(linear):
-        costs = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
+        costs, exact = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
     else:
         moments = reduced.moments(columns, target, roots)
         costs = reduced.grid_costs(
             lambda unit: problem.columns(bumps, unit, count)[:, 0], grid, moments
         )
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
-    return starts.reshape(-1), cells.reshape(-1)
+    # Shared terms tie the directions; then neither is a problem of its own.
+    return _Best(starts.reshape(-1), cells.reshape(-1), None if shared else exact)
 
 
 def _has_constant(linear) -> bool:
@@ -179,7 +210,8 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
     speed = jnp.where(used, speed, slowest)
     moments = reduced.moments(columns, target, roots, jnp.sign(velocity))
     straight = all(isinstance(t, Coulomb | Viscous) for term in linear for t in summands(term))
-    if straight and grid.shape[0] >= compress.LEAST_POINTS:
+    on_nodes = straight and grid.shape[0] >= compress.LEAST_POINTS
+    if on_nodes:
         narrowest = problem.box[0, 0]
         panels = compress.edges(slowest, jnp.max(speed), narrowest)
         moments = compress.compressed(moments, speed, panels)
@@ -189,7 +221,7 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
         beta = reduced.decode(unit, problem.box[:, :count], problem.logarithmic[:count])
         return bump.with_beta(beta).contrast(speed, slowest)
 
-    return reduced.grid_costs(contrast, grid, moments)
+    return reduced.grid_costs(contrast, grid, moments), (contrast, moments, on_nodes)
 
 
 def _general_sides(problem, bumps, grid, columns, target, roots):
