@@ -18,8 +18,9 @@ from .reduced import Moments
 ORDER = 20
 # 13 octaves from the finest panel to the fastest speed: a ratio of 8000.
 PANELS = 13
-# One pass over the samples costs about as much as 70 bumps; smaller grids are not worth it.
-LEAST_POINTS = 256
+# One pass over the samples costs about as much as 70 bumps, and the refinement evaluates 30 more;
+# smaller grids are not worth it.
+LEAST_POINTS = 100
 # Samples at a time: their 20 polynomials stay in the cache.
 _BLOCK = 1024
 

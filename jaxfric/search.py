@@ -61,13 +61,21 @@ def search(
 class _Best(NamedTuple):
     """The best grid point and the cell around it, in the unit cube.
 
-    Where each direction is one bump's own problem, `sides` holds the bump, its moments, and
-    whether they stand on nodes instead of the samples.
+    `sides`, where each direction is one bump's own problem, and `samples`, the same on the samples
+    where `sides` stands on nodes instead.
     """
 
     start: Float[Array, " d"]
     cell: Float[Array, " d"]
-    sides: tuple[Callable, reduced.Moments, bool] | None = None
+    sides: "_Sides | None" = None
+    samples: "_Sides | None" = None
+
+
+class _Sides(NamedTuple):
+    """One bump's values at the places of the moments, as a function of the unit cube."""
+
+    bump: Callable[[Float[Array, " d"]], Float[Array, " J"]]
+    moments: reduced.Moments
 
 
 class _Problem(eqx.Module):
@@ -113,17 +121,15 @@ def _refine(problem: _Problem, best: _Best):
     """
     if best.sides is None:
         return refine.refine(problem.residuals(), best.start, best.cell)
-    bump, moments, on_nodes = best.sides
-    pair = best.start.reshape(2, -1), best.cell.reshape(2, -1)
-    unit, converged = reduced.refine_bump(bump, moments, *pair)
-    unit, converged = unit.reshape(-1), jnp.all(converged)
-    if not on_nodes:
-        return unit, converged
-    residuals = problem.residuals()
-    points = jnp.stack([best.start, unit])
-    before, after = jax.lax.map(lambda point: jnp.sum(residuals(point) ** 2), points)
-    fine = after <= before * (1 + 64 * jnp.finfo(unit.dtype).eps)
-    return jnp.where(fine, unit, best.start), converged & fine
+    start = best.start.reshape(2, -1)
+    unit, converged = reduced.refine_bump(*best.sides, start, best.cell.reshape(2, -1))
+    if best.samples is not None:
+        bump, moments = best.samples
+        gains = moments.gains(jax.vmap(bump)(jnp.concatenate([start, unit])))
+        before, after = jnp.diagonal(gains[:, :2]), jnp.diagonal(gains[:, 2:])
+        fine = after >= before * (1 - 64 * jnp.finfo(unit.dtype).eps)
+        unit, converged = jnp.where(fine[:, None], unit, start), converged & fine
+    return unit.reshape(-1), jnp.all(converged)
 
 
 @jax.custom_jvp
@@ -181,11 +187,11 @@ def _grid_sides(sides, problem: _Problem, points):
     target = rows.target - rows.offset(problem.term, recording)
     bumps, count = reduced.part(inner, True), len(inner.nonlinear)
     grid = reduced.grid_points(count, points, roots.dtype)
-    one, exact = summands(bumps), None
+    one, exact = summands(bumps), ()
     if len(bumps.affine) > 1:
         costs = _general_sides(problem, bumps, grid, columns, target, roots)
     elif rows.sampled and isinstance(one[0], AbstractBump) and _has_constant(linear):
-        costs, exact = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
+        costs, *exact = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
     else:
         moments = reduced.moments(columns, target, roots)
         costs = reduced.grid_costs(
@@ -193,7 +199,7 @@ def _grid_sides(sides, problem: _Problem, points):
         )
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
-    return _Best(starts.reshape(-1), cells.reshape(-1), None if shared else exact)
+    return _Best(starts.reshape(-1), cells.reshape(-1), *(() if shared else exact))
 
 
 def _has_constant(linear) -> bool:
@@ -203,25 +209,30 @@ def _has_constant(linear) -> bool:
 
 def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linear):
     """The grid of one smooth bump over samples, by its contrast, and on nodes where that pays."""
-    velocity, count = problem.recording.velocity, len(bump.nonlinear)
+    velocity = problem.recording.velocity
     speed, used = jnp.abs(velocity), jnp.any(roots > 0, axis=0)
     slowest = jnp.min(jnp.where(used, speed, jnp.inf))
     slowest = jnp.where(jnp.isfinite(slowest), slowest, 1.0)
     speed = jnp.where(used, speed, slowest)
     moments = reduced.moments(columns, target, roots, jnp.sign(velocity))
     straight = all(isinstance(t, Coulomb | Viscous) for term in linear for t in summands(term))
-    on_nodes = straight and grid.shape[0] >= compress.LEAST_POINTS
-    if on_nodes:
-        narrowest = problem.box[0, 0]
-        panels = compress.edges(slowest, jnp.max(speed), narrowest)
-        moments = compress.compressed(moments, speed, panels)
-        speed = compress.nodes(panels)
+    sides, samples = _Sides(_contrast(problem, bump, speed, slowest), moments), None
+    if straight and grid.shape[0] >= compress.LEAST_POINTS:
+        panels = compress.edges(slowest, jnp.max(speed), problem.box[0, 0])
+        nodes, samples = compress.compressed(moments, speed, panels), sides
+        sides = _Sides(_contrast(problem, bump, compress.nodes(panels), slowest), nodes)
+    return reduced.grid_costs(sides.bump, grid, sides.moments), sides, samples
+
+
+def _contrast(problem, bump: AbstractBump, speed, slowest):
+    """The bump's contrast at those speeds, as a function of the unit cube."""
+    count = len(bump.nonlinear)
 
     def contrast(unit):
         beta = reduced.decode(unit, problem.box[:, :count], problem.logarithmic[:count])
         return bump.with_beta(beta).contrast(speed, slowest)
 
-    return reduced.grid_costs(contrast, grid, moments), (contrast, moments, on_nodes)
+    return contrast
 
 
 def _general_sides(problem, bumps, grid, columns, target, roots):
