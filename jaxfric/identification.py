@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import reduced, signals, uncertainty, weighing
+from . import programs, reduced, signals, uncertainty, weighing
 from .identified import Identified, Result, raise_unless_successful
 from .models import Model, named
 from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
@@ -128,7 +128,7 @@ def _identify_batch(term, recording, projection, width, given, grid):
     return jax.lax.map(one, recording, batch_size=min(16, recording.time.shape[0]))
 
 
-@eqx.filter_jit
+@programs.kept
 def _identify(term, recording, projection, width, given, grid) -> Identified:
     finite = _finite(recording)
     recording = _sanitised(recording)

@@ -2,6 +2,7 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from . import uncertainty
@@ -107,7 +108,10 @@ class Identified(eqx.Module):
     def parameters(self) -> dict[str, Estimate]:
         """Each parameter's value, standard error and unit, by name."""
         term, units = self.model.term, dict(self.model.units)
-        errors = jnp.sqrt(jnp.diagonal(self.covariance, axis1=-2, axis2=-1))
+        variances = self.covariance.diagonal(axis1=-2, axis2=-1)
+        # A result moved to numpy stays there, so that reading it compiles nothing.
+        numpy = isinstance(variances, np.ndarray)
+        errors = np.sqrt(variances) if numpy else jnp.sqrt(variances)
         freedom = uncertainty.COSINES
         values = self.model.parameters
         return {

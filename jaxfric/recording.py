@@ -12,19 +12,26 @@ from jaxtyping import Array, Bool, Float, Int
 from .units import SI
 
 
+def _array(value, dtype=None):
+    """An array of jax; one of numpy is moved as it is, for which nothing is compiled."""
+    if isinstance(value, np.ndarray):
+        return jax.device_put(value if dtype is None else value.astype(dtype, copy=False))
+    return jnp.asarray(value, dtype)
+
+
 def _flags(value):
-    return None if value is None else jnp.asarray(value).astype(bool)
+    return None if value is None else _array(value, bool)
 
 
 def _whole(value):
-    return None if value is None else jnp.asarray(value).astype(jnp.int32)
+    return None if value is None else _array(value, np.int32)
 
 
 def _signal(value):
     """A floating-point array; whole numbers (encoder counts) become the default float."""
     if value is None:
         return None
-    value = jnp.asarray(value)
+    value = _array(value)
     return value if jnp.issubdtype(value.dtype, jnp.floating) else value.astype(float)
 
 
@@ -64,9 +71,9 @@ class Recording(eqx.Module):
     def __post_init__(self):
         shape = np.shape(self.time)  # equinox converts the fields afterwards: it may be a list
         if self.mask is None:
-            self.mask = jnp.ones(shape, bool)
+            self.mask = np.ones(shape, bool)
         if self.segment is None:
-            self.segment = jnp.zeros(shape, jnp.int32)
+            self.segment = np.zeros(shape, np.int32)
             self.num_segments = 1
         elif self.num_segments is None:
             if isinstance(self.segment, jax.core.Tracer):
@@ -115,9 +122,14 @@ def pad(recording: Recording, length: int) -> Recording:
         raise ValueError(f"Cannot pad {recording.num_samples} samples to {length}.")
     if extra == 0:
         return recording
-    padded = jax.tree.map(lambda x: jnp.pad(x, (0, extra), mode="edge"), recording)
-    mask = jnp.pad(recording.mask, (0, extra), constant_values=False)
-    return eqx.tree_at(lambda r: r.mask, padded, mask)
+
+    def lengthen(x, **how):
+        # On the host nothing has to be compiled for each length anew.
+        numpy = jnp if isinstance(x, jax.core.Tracer) else np
+        return _array(numpy.pad(x, (0, extra), **how))
+
+    padded = jax.tree.map(lambda x: lengthen(x, mode="edge"), recording)
+    return eqx.tree_at(lambda r: r.mask, padded, lengthen(recording.mask))
 
 
 def stack(recordings: Sequence[Recording]) -> Recording:

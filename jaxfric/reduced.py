@@ -14,7 +14,6 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from . import small
-from .refine import descend
 from .terms.base import AbstractTerm, Directional, Sum
 
 # A tile of grid points times samples stays below this many numbers, so that it lives in the cache
@@ -266,6 +265,7 @@ def refine_bump(
 
     **Arguments:** `start`, `cell`: as for [`refine`][jaxfric.refine.refine], `(R, d)`.
     """
+    from .refine import descend  # optimistix takes long to import, and a kept program does without
 
     def side(against, weights, whole, start, cell):
         one = Moments(rows.shared, rows.dual, against[None], weights[None], whole[None])

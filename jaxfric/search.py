@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import compress, reduced, refine, small
+from . import compress, reduced, small
 from .projections import Rows
 from .recording import Recording
 from .terms.base import AbstractTerm, Directional, Sum, summands
@@ -120,6 +120,8 @@ def _refine(problem: _Problem, best: _Best):
     What nodes say is checked on the samples: the result is never worse there than the grid's.
     """
     if best.sides is None:
+        from . import refine  # optimistix takes long to import, and a kept program does without
+
         return refine.refine(problem.residuals(), best.start, best.cell)
     start = best.start.reshape(2, -1)
     unit, converged = reduced.refine_bump(*best.sides, start, best.cell.reshape(2, -1))

@@ -2,12 +2,12 @@
 
 import dataclasses
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from . import programs
 from .recording import Recording
 from .terms.base import Scales
 
@@ -180,10 +180,10 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
     return jnp.asarray(widths, dtype)[jnp.argmin(risk)]
 
 
-_choose = eqx.filter_jit(choose_half_width)
+_choose = programs.kept(choose_half_width)
 
 
-@eqx.filter_jit
+@programs.kept
 def _slope(recording, signal, half_width, reach):
     # Half a sample more, so that the last sample to each side still counts.
     return local_quadratic(recording, signal, (half_width + 0.5) * interval(recording), reach)[1]
@@ -259,7 +259,7 @@ def counter_velocity(
     return velocity.at[0].set(velocity[1])
 
 
-@eqx.filter_jit
+@programs.kept
 def _host_facts(recording):
     limits = scales(recording)
     position = recording.position

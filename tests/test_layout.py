@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 
 # Each room imports only from rooms before it. A new file gets its place here, or the test says so.
 ORDER = """
-    units recording terms signals models catalogue effects
+    units programs recording terms signals models catalogue effects
     columns delimited cleaning tables io
     small refine projections reduced compress uncertainty search
     weighing identified identification selection online fleet

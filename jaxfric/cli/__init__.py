@@ -4,6 +4,7 @@ Nothing heavy is imported before a command runs, so that `jaxfric --help` answer
 """
 
 import argparse
+import gc
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -38,6 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _configure() -> None:
     """float64, and compiled programs kept in the user's cache folder."""
+    gc.disable()  # importing makes much and throws nothing away: a fifth of its time
     # Explaining multiplies many small matrices, where several threads wait more than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import jax
@@ -91,7 +93,15 @@ class _Version(argparse.Action):
 def _lazily(place: str) -> Callable[[argparse.Namespace], int]:
     """A function of this package, `module.name`, imported when it is called."""
     module, _, name = place.partition(".")
-    return lambda arguments: getattr(import_module(f".{module}", __name__), name)(arguments)
+
+    def run(arguments):
+        function = getattr(import_module(f".{module}", __name__), name)
+        # What was imported stays: from here on the collector need not look at it.
+        gc.freeze()
+        gc.enable()
+        return function(arguments)
+
+    return run
 
 
 def _parser() -> argparse.ArgumentParser:

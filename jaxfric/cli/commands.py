@@ -7,20 +7,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
-from .. import control, documents, models as known, tabulate
+from .. import documents, models as known, tabulate
 from ..identification import identify as identify_recording
 from ..identified import Identified
 from ..io import read_with_notes, write_bytes, write_table, write_text
 from ..models import Model
-from ..prediction import predict as predict_force, relative_error
+from ..programs import kept_in
 from ..projections import AbstractProjection, ClosedWindows, WeakForm
 from ..recording import Recording, pad
-from ..report import pictures
-from ..selection import select
 from ..signals import kernel_half_width, prepare
-from ..simulation import simulate as simulate_model
 from ..units import SI
 from .options import message
 
@@ -57,18 +55,28 @@ def fitted(
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
     if model == "best":
+        from ..selection import select
+
         model = select(recording).name
-    prepared = prepare(uniform(recording))
-    chosen: AbstractProjection | None = None
-    if projection == "closed-windows":
-        chosen = ClosedWindows()
-    elif projection == "weak-form":
-        chosen = WeakForm(kernel_half_width(prepared))
-    try:
-        found = identify_recording(model, prepared, projection=chosen, bounds=bounds)
-    except ValueError as error:
-        raise ValueError(f"{recording.source}: {error}") from error
-    return model, found
+    with kept_in(_programs()):
+        prepared = prepare(uniform(recording))
+        chosen: AbstractProjection | None = None
+        if projection == "closed-windows":
+            chosen = ClosedWindows()
+        elif projection == "weak-form":
+            chosen = WeakForm(kernel_half_width(prepared))
+        try:
+            found = identify_recording(model, prepared, projection=chosen, bounds=bounds)
+        except ValueError as error:
+            raise ValueError(f"{recording.source}: {error}") from error
+    # Arrays of numpy: taking them apart compiles nothing.
+    return model, jax.tree.map(np.asarray, found)
+
+
+def _programs() -> Path | None:
+    """Beside jax's own cache, if there is one."""
+    folder = jax.config.values["jax_compilation_cache_dir"]
+    return None if folder is None else Path(folder) / "programs"
 
 
 def identify(arguments: Namespace) -> int:
@@ -79,6 +87,8 @@ def identify(arguments: Namespace) -> int:
     if many and (arguments.plot or arguments.save):
         raise ValueError("--plot and --save take one recording; for many, use --json.")
     if arguments.plot:
+        from ..report import pictures
+
         pictures.library()
     done, failures = [], 0
     for i, path in enumerate(arguments.files):
@@ -125,6 +135,8 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
 
 def draw(found: Identified, recording: Recording, path: str | Path) -> None:
     """Write the picture of an identification."""
+    from ..report import pictures
+
     drawn = dataclasses.replace(uniform(recording), source=recording.source)
     write_bytes(path, pictures.render(found, drawn, Path(path).suffix.lstrip(".").lower()))
 
@@ -145,6 +157,8 @@ def _progress(text: str) -> None:
 
 def predict(arguments: Namespace) -> int:
     """`jaxfric predict`: force beside the measured one, as a table."""
+    from ..prediction import predict as predict_force, relative_error
+
     model = _load(arguments.model)
     recording, notes = read(arguments.file, arguments)
     recording = _in_units(recording, model, arguments)
@@ -168,6 +182,9 @@ def predict(arguments: Namespace) -> int:
 
 def simulate(arguments: Namespace) -> int:
     """`jaxfric simulate`: motion and force of a model, as a table."""
+    from .. import control
+    from ..simulation import simulate as simulate_model
+
     model = _load(arguments.model)
     controller = None
     if arguments.controller:

@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..recording import Recording
@@ -316,11 +317,15 @@ def _batched(body, recording: Recording) -> Float[Array, "N p"]:
 
 def _vector(values) -> Float[Array, " k"]:
     """Numbers as one vector; a batch of each as a batch of vectors."""
+    if values and all(isinstance(v, np.ndarray | np.generic) for v in values):
+        return np.stack(values, axis=-1)
     return jnp.stack([jnp.asarray(v) for v in values], axis=-1) if values else jnp.zeros((0,))
 
 
 def _joined(vectors) -> Float[Array, " k"]:
     full = [vector for vector in vectors if vector.shape[-1]]
+    if full and all(isinstance(vector, np.ndarray) for vector in full):
+        return np.concatenate(full, axis=-1)  # of what was moved to numpy nothing is compiled
     return jnp.concatenate(full, axis=-1) if full else jnp.zeros((0,))
 
 

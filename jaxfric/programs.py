@@ -1,0 +1,164 @@
+"""Compiled programs kept in a folder, so that the next process neither traces nor compiles them.
+
+jax's own compilation cache spares the compiling; but before it can look there it traces and lowers
+the whole program again, which for an identification takes several times as long as running it.
+"""
+
+import hashlib
+import os
+import pickle
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache, wraps
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+
+# Programs in the folder, some 2 MB each; of more the one that was not used for longest goes.
+MOST = 48
+# XLA's newer way to emit loops, and its optimisation of them, take five times as long to compile
+# an identification as it then runs quicker on 50,000 samples.
+QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
+QUICK_SAMPLES = 2**16
+
+_folder: Path | None = None
+
+
+@contextmanager
+def kept_in(folder: Path | None) -> Iterator[None]:
+    """Inside, functions marked by [`kept`][] take their programs from a folder and put them there.
+
+    The folder must be the user's own: a program in it is trusted as an installed one is. `None`
+    changes nothing.
+    """
+    global _folder
+    before, _folder = _folder, folder
+    try:
+        yield
+    finally:
+        _folder = before
+
+
+def kept(function: Callable) -> Callable:
+    """A function of pytrees compiled as by `equinox.filter_jit`, and kept where [`kept_in`][] says.
+
+    Only calls with concrete arrays on a single CPU device are kept; any other is as without.
+    """
+    compiled = eqx.filter_jit(function)
+
+    @wraps(function)
+    def call(*arguments):
+        if _folder is None or not _simple(arguments):
+            return compiled(*arguments)
+        return _call(function, arguments, _folder)
+
+    return call
+
+
+def _simple(arguments) -> bool:
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments))
+    return not traced and jax.default_backend() == "cpu" and jax.device_count() == 1
+
+
+def _call(function, arguments, folder: Path):
+    arrays, others = eqx.partition(arguments, eqx.is_array)
+    leaves, tree = jax.tree.flatten(arrays)
+    name = f"{function.__module__}.{function.__qualname__}"
+    key = _key(name, leaves, tree, others)
+    path = folder / f"{name}-{key}.program"
+    found = _load(path, len(leaves))
+    if found is None:
+        found = _compile(function, leaves, tree, others)
+        _save(path, *found)
+    program, template = found
+    values = program(leaves)
+    return jax.tree.map(lambda i: values[i], template)
+
+
+def _key(name: str, leaves, tree, others) -> str:
+    """What a program depends on: its source, its static arguments, shapes, jax, and the machine."""
+    shapes = [(leaf.shape, str(leaf.dtype)) for leaf in leaves]
+    settings = (jax.config.values["jax_enable_x64"], os.environ.get("XLA_FLAGS", ""))
+    facts = (name, str(tree), repr(jax.tree.flatten(others)), shapes, settings, _source(), _host())
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
+
+
+@cache
+def _source() -> tuple:
+    """The library's files as make would judge them, by size and time."""
+    top = Path(__file__).parent
+    files = sorted(top.rglob("*.py"))
+    return tuple((str(f.relative_to(top)), f.stat().st_size, f.stat().st_mtime_ns) for f in files)
+
+
+@cache
+def _host() -> tuple[str, ...]:
+    """Versions, and the processor with its instruction sets: a home folder can be shared."""
+    import jaxlib
+
+    facts = [platform.python_version(), jax.__version__, jaxlib.__version__]
+    facts += [platform.system(), platform.machine(), platform.processor()]
+    with suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        kinds = ("model name", "flags", "Features", "CPU part")
+        facts += sorted({line for line in lines if line.startswith(kinds)})
+    return tuple(facts)
+
+
+def _compile(function, leaves, tree, others):
+    """The program from leaves to leaves, and the output with numbers in place of its arrays."""
+    structure: list[Any] = []
+
+    def flat(leaves):
+        arrays = jax.tree.unflatten(tree, leaves)
+        result, made = jax.tree.flatten(function(*eqx.combine(arrays, others)))
+        structure.append(made)
+        return result
+
+    lowered = jax.jit(flat).lower(leaves)
+    size = max((leaf.size for leaf in leaves), default=0)
+    threshold = jax.config.jax_persistent_cache_min_compile_time_secs
+    # A program out of jax's own cache cannot be written a second time, so it must not get there.
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", float("inf"))
+    try:
+        program = lowered.compile(QUICK if size <= QUICK_SAMPLES else None)
+    except jax.errors.JaxRuntimeError:  # a jaxlib that knows these options no longer
+        program = lowered.compile()
+    finally:
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", threshold)
+    made = structure[-1]
+    return program, jax.tree.unflatten(made, range(made.num_leaves))
+
+
+def _load(path: Path, count: int):
+    """A kept program and the template of its output, or `None` if there is none that works."""
+    from jax.experimental import serialize_executable
+
+    # Whatever is wrong with the file, compiling again is right.
+    with suppress(Exception):
+        binary, template = pickle.loads(path.read_bytes())
+        inputs = jax.tree.structure((([0] * count,), {}))
+        outputs = jax.tree.structure([0] * len(jax.tree.leaves(template)))
+        program = serialize_executable.deserialize_and_load(binary, inputs, outputs)
+        os.utime(path)
+        return program, template
+    return None
+
+
+def _save(path: Path, program, template) -> None:
+    from jax.experimental import serialize_executable
+
+    # A full or read-only disk, a backend that cannot: slower next time, and no worse.
+    with suppress(Exception):
+        binary = serialize_executable.serialize(program)[0]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Whole or not at all: another process may be reading, or writing the same.
+        whole = path.with_suffix(f".{os.getpid()}")
+        whole.write_bytes(pickle.dumps((binary, template)))
+        whole.replace(path)
+        files = sorted(path.parent.glob("*.program"), key=lambda f: f.stat().st_mtime)
+        for old in files[:-MOST]:
+            old.unlink()

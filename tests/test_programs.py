@@ -1,0 +1,102 @@
+"""Programs kept on disk: the same results, no tracing, and no harm from a bad file."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import programs
+
+
+class Pair(eqx.Module):
+    value: jax.Array
+    name: str = eqx.field(static=True)
+
+
+class Traces:
+    count = 0
+
+
+@programs.kept
+def double(pair, power, table):
+    Traces.count += 1
+    return Pair(2 * pair.value**power, pair.name), table["shift"] + 1
+
+
+@pytest.fixture(autouse=True)
+def fresh():
+    Traces.count = 0
+    jax.clear_caches()
+
+
+ARGUMENTS = (Pair(np.arange(3.0), "a"), 2, {"shift": np.ones(2)})
+
+
+def call(folder, arguments=ARGUMENTS):
+    with programs.kept_in(folder):
+        return double(*arguments)
+
+
+def files(folder):
+    return sorted(folder.glob("*.program"))
+
+
+def test_a_kept_program_is_not_traced_again(tmp_path):
+    first, second = call(tmp_path), call(tmp_path)
+    assert Traces.count == 1 and len(files(tmp_path)) == 1
+    assert not [f for f in tmp_path.iterdir() if f.suffix != ".program"]
+    plain = double(*ARGUMENTS)
+    assert jax.tree.structure(first) == jax.tree.structure(second) == jax.tree.structure(plain)
+    for a, b, c in zip(*map(jax.tree.leaves, (first, second, plain)), strict=True):
+        np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(a, c)
+
+
+def test_whatever_decides_a_program_is_in_its_name(tmp_path):
+    pair, power, table = ARGUMENTS
+    others = [
+        (Pair(pair.value, "b"), power, table),
+        (pair, 3, table),
+        (Pair(np.arange(4.0), "a"), power, table),
+        (Pair(np.arange(3, dtype=np.float32), "a"), power, table),
+    ]
+    call(tmp_path)
+    for arguments in others:
+        call(tmp_path, arguments)
+    assert len(files(tmp_path)) == Traces.count == 5
+    call(tmp_path, (Pair(np.zeros(3), "a"), power, table))  # values do not
+    assert Traces.count == 5
+
+
+@pytest.mark.parametrize("damage", [b"", b"not a program", None])
+def test_a_damaged_program_is_made_anew(tmp_path, damage):
+    call(tmp_path)
+    (path,) = files(tmp_path)
+    path.write_bytes(path.read_bytes()[:-100] if damage is None else damage)
+    np.testing.assert_array_equal(call(tmp_path)[0].value, [0.0, 2.0, 8.0])
+    assert Traces.count == 2
+    call(tmp_path)
+    assert Traces.count == 2
+
+
+def test_a_folder_that_cannot_be_written_does_no_harm(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    np.testing.assert_array_equal(call(blocked)[0].value, [0.0, 2.0, 8.0])
+
+
+def test_inside_a_trace_it_is_an_ordinary_function(tmp_path):
+    def total(value):
+        with programs.kept_in(tmp_path):
+            return jnp.sum(double(Pair(value, "a"), 2, {"shift": jnp.ones(2)})[0].value)
+
+    np.testing.assert_allclose(jax.jit(jax.grad(total))(jnp.arange(3.0)), [0.0, 4.0, 8.0])
+    assert not files(tmp_path)
+
+
+def test_the_oldest_programs_go(tmp_path, monkeypatch):
+    monkeypatch.setattr(programs, "MOST", 2)
+    for power in range(4):
+        call(tmp_path, (ARGUMENTS[0], power, ARGUMENTS[2]))
+    assert len(files(tmp_path)) == 2
