@@ -11,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from . import small
 from .terms.base import AbstractTerm, Directional, Sum
@@ -255,21 +255,12 @@ def decode(
     return jnp.where(jnp.asarray(logarithmic), positive * ratio**unit, linear)
 
 
-def refine_bump(
-    bump: Callable[[Float[Array, " d"]], Float[Array, " J"]],
-    rows: Moments,
-    start: Float[Array, "R d"],
-    cell: Float[Array, "R d"],
-) -> tuple[Float[Array, "R d"], Bool[Array, " R"]]:
-    """The minimisers of one bump's cost, one for each weighting, on the places of `rows`.
+def each(function: Callable, rows: Moments, *more):
+    """`function` of the moments of each weighting alone and its row of `more`, stacked."""
 
-    **Arguments:** `start`, `cell`: as for [`refine`][jaxfric.refine.refine], `(R, d)`.
-    """
-    from .refine import descend  # optimistix takes long to import, and a kept program does without
+    def side(item):
+        against, weights, whole, *rest = item
+        alone = (against[None], weights[None], whole[None])
+        return function(Moments(rows.shared, rows.dual, *alone), *rest)
 
-    def side(against, weights, whole, start, cell):
-        one = Moments(rows.shared, rows.dual, against[None], weights[None], whole[None])
-        return descend(lambda unit: -one.gains(bump(unit)[None, :])[0, 0], start, cell)
-
-    items = (rows.against, rows.weights, rows.whole, start, cell)
-    return jax.lax.map(lambda item: side(*item), items)
+    return jax.lax.map(side, (rows.against, rows.weights, rows.whole, *more))

@@ -72,10 +72,43 @@ class _Best(NamedTuple):
 
 
 class _Sides(NamedTuple):
-    """One bump's values at the places of the moments, as a function of the unit cube."""
+    """One bump's values at the places of the moments, as a function of β, and each direction's
+    bounds of β, `(2, 2, d)`.
+    """
 
     bump: Callable[[Float[Array, " d"]], Float[Array, " J"]]
     moments: reduced.Moments
+    boxes: Float[Array, "2 2 d"]
+    logarithmic: tuple[bool, ...]
+
+    def at(self, unit: Float[Array, " d"], box: Float[Array, "2 d"]) -> Float[Array, " J"]:
+        """The bump at a point of one direction's unit cube."""
+        return self.bump(reduced.decode(unit, box, self.logarithmic))
+
+    def costs(self, grid: Float[Array, "G d"]) -> Float[Array, "2 G"]:
+        """The cost of each direction over its own bounds."""
+
+        def side(rows, box):
+            return reduced.grid_costs(lambda unit: self.at(unit, box), grid, rows)[0]
+
+        return reduced.each(side, self.moments, self.boxes)
+
+    def gains(self, units: Float[Array, "2 k d"]) -> Float[Array, "2 k"]:
+        """What each direction's bump takes off its cost, at some points of its unit cube."""
+
+        def side(rows, box, points):
+            return rows.gains(jax.vmap(lambda unit: self.at(unit, box))(points))[0]
+
+        return reduced.each(side, self.moments, self.boxes, units)
+
+    def refined(self, start: Float[Array, "2 d"], cell: Float[Array, "2 d"]):
+        """The minimiser of each direction near its start, `(2, d)`, and which converged."""
+        from . import refine  # optimistix takes long to import, and a kept program does without
+
+        def side(rows, box, start, cell):
+            return refine.descend(lambda y: -rows.gains(self.at(y, box)[None])[0, 0], start, cell)
+
+        return reduced.each(side, self.moments, self.boxes, start, cell)
 
 
 class _Problem(eqx.Module):
@@ -87,10 +120,16 @@ class _Problem(eqx.Module):
     box: Float[Array, "2 d"]
     logarithmic: tuple[bool, ...] = eqx.field(static=True)
 
-    def columns(self, term: AbstractTerm, unit, count: int | None = None) -> Float[Array, "J k"]:
-        """The rows of the nonlinear columns of a term at a point of the unit cube."""
-        beta = reduced.decode(unit, self.box[:, :count], self.logarithmic[:count])
+    def columns(self, term: AbstractTerm, unit, box=None) -> Float[Array, "J k"]:
+        """The rows of the nonlinear columns of a term at a point of the unit cube, or of `box`."""
+        box = self.box if box is None else box
+        beta = reduced.decode(unit, box, self.logarithmic[: box.shape[1]])
         return self.rows.columns(term.with_beta(beta), self.recording)
+
+    @property
+    def boxes(self) -> Float[Array, "2 2 d"]:
+        """The bounds of each direction's β, where it has its own."""
+        return jnp.moveaxis(self.box.reshape(2, 2, -1), 1, 0)
 
     def linear(self):
         """Orthonormal weighted columns without β, root weights, and the weighted force less
@@ -124,11 +163,9 @@ def _refine(problem: _Problem, best: _Best):
 
         return refine.refine(problem.residuals(), best.start, best.cell)
     start = best.start.reshape(2, -1)
-    unit, converged = reduced.refine_bump(*best.sides, start, best.cell.reshape(2, -1))
+    unit, converged = best.sides.refined(start, best.cell.reshape(2, -1))
     if best.samples is not None:
-        bump, moments = best.samples
-        gains = moments.gains(jax.vmap(bump)(jnp.concatenate([start, unit])))
-        before, after = jnp.diagonal(gains[:, :2]), jnp.diagonal(gains[:, 2:])
+        before, after = best.samples.gains(jnp.stack([start, unit], axis=1)).T
         fine = after >= before * (1 - 64 * jnp.finfo(unit.dtype).eps)
         unit, converged = jnp.where(fine[:, None], unit, start), converged & fine
     return unit.reshape(-1), jnp.all(converged)
@@ -196,9 +233,11 @@ def _grid_sides(sides, problem: _Problem, points):
         costs, *exact = _bump_sides(problem, one[0], grid, columns, target, roots, linear)
     else:
         moments = reduced.moments(columns, target, roots)
-        costs = reduced.grid_costs(
-            lambda unit: problem.columns(bumps, unit, count)[:, 0], grid, moments
-        )
+
+        def values(beta):
+            return rows.columns(bumps.with_beta(beta), recording)[:, 0]
+
+        costs = _Sides(values, moments, problem.boxes, problem.logarithmic[:count]).costs(grid)
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
     return _Best(starts.reshape(-1), cells.reshape(-1), *(() if shared else exact))
@@ -218,38 +257,36 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
     speed = jnp.where(used, speed, slowest)
     moments = reduced.moments(columns, target, roots, jnp.sign(velocity))
     straight = all(isinstance(t, Coulomb | Viscous) for term in linear for t in summands(term))
-    sides, samples = _Sides(_contrast(problem, bump, speed, slowest), moments), None
+
+    def sides(speed, moments):
+        def contrast(beta):
+            return bump.with_beta(beta).contrast(speed, slowest)
+
+        return _Sides(contrast, moments, problem.boxes, problem.logarithmic[: grid.shape[1]])
+
+    here, samples = sides(speed, moments), None
     if straight and grid.shape[0] >= compress.LEAST_POINTS:
-        panels = compress.edges(slowest, jnp.max(speed), problem.box[0, 0])
-        nodes, samples = compress.compressed(moments, speed, panels), sides
-        sides = _Sides(_contrast(problem, bump, compress.nodes(panels), slowest), nodes)
-    return reduced.grid_costs(sides.bump, grid, sides.moments), sides, samples
-
-
-def _contrast(problem, bump: AbstractBump, speed, slowest):
-    """The bump's contrast at those speeds, as a function of the unit cube."""
-    count = len(bump.nonlinear)
-
-    def contrast(unit):
-        beta = reduced.decode(unit, problem.box[:, :count], problem.logarithmic[:count])
-        return bump.with_beta(beta).contrast(speed, slowest)
-
-    return contrast
+        # The first nonlinear parameter of a bump is its width.
+        panels = compress.edges(slowest, jnp.max(speed), jnp.min(problem.boxes[:, 0, 0]))
+        nodes = compress.compressed(moments, speed, panels)
+        here, samples = sides(compress.nodes(panels), nodes), here
+    return here.costs(grid), here, samples
 
 
 def _general_sides(problem, bumps, grid, columns, target, roots):
     """The grid of several nonlinear columns, one direction after the other."""
 
-    def side(weigh):
+    def side(item):
+        weigh, box = item
         basis = reduced.orthonormal(weigh[:, None] * columns)
         left = reduced.project_out(basis, (weigh * target)[:, None])[:, 0]
 
         def weighted(unit):
-            return weigh[:, None] * problem.columns(bumps, unit, grid.shape[1])
+            return weigh[:, None] * problem.columns(bumps, unit, box)
 
         return reduced.general_grid_costs(weighted, grid, basis, left)
 
-    return jax.lax.map(side, roots)
+    return jax.lax.map(side, (roots, problem.boxes))
 
 
 def _best(grid, costs):

@@ -270,3 +270,16 @@ def test_single_precision_is_sane(name):
             gap = abs(float(single.parameters[key].value) - float(estimate.value))
             # The cost is flat to rounding within √ε of its minimum: well inside the uncertainty.
             assert gap <= 0.3 * float(estimate.standard_error) + 1e-3 * abs(float(estimate.value))
+
+
+@pytest.mark.parametrize("points", [None, 64], ids=["nodes", "samples"])
+def test_each_direction_is_searched_inside_its_own_bounds(points):
+    friction, bare, rows, *_ = problem("gaussian", 0.02)
+    wide, odd = ([[0.002, low], [0.1, high]] for low, high in ((0.002, 0.1), (0.011, 0.3)))
+    same = search(friction, bare, rows, jnp.asarray(wide), points)
+    other = search(friction, bare, rows, jnp.asarray(odd), points)
+    assert not bool(other.on_border)
+    np.testing.assert_allclose(other.beta, same.beta, rtol=1e-9)
+    held = search(friction, bare, rows, jnp.asarray([[0.002, 0.03], [0.1, 0.3]]), points)
+    assert bool(held.on_border)
+    np.testing.assert_allclose(held.beta, [same.beta[0], 0.03], rtol=1e-9)
