@@ -156,7 +156,8 @@ class _Problem(eqx.Module):
 def _refine(problem: _Problem, best: _Best):
     """The minimiser near the best grid point, and whether the refinement converged.
 
-    What nodes say is checked on the samples: the result is never worse there than the grid's.
+    What nodes say is checked on the samples: the result is never worse there than the grid's, and
+    has not converged where the two disagree.
     """
     if best.sides is None:
         from . import refine  # optimistix takes long to import, and a kept program does without
@@ -167,7 +168,10 @@ def _refine(problem: _Problem, best: _Best):
     if best.samples is not None:
         before, after = best.samples.gains(jnp.stack([start, unit], axis=1)).T
         fine = after >= before * (1 - 64 * jnp.finfo(unit.dtype).eps)
-        unit, converged = jnp.where(fine[:, None], unit, start), converged & fine
+        # Nodes that are off by half the digits do not stand for these samples.
+        off = jnp.abs(best.sides.gains(unit[:, None])[:, 0] - after)
+        true = off <= jnp.finfo(unit.dtype).eps ** 0.5 * best.samples.moments.whole
+        unit, converged = jnp.where(fine[:, None], unit, start), converged & fine & true
     return unit.reshape(-1), jnp.all(converged)
 
 
