@@ -10,8 +10,9 @@ from jaxtyping import Array, Bool, Float
 
 from . import programs, reduced, signals, uncertainty, weighing
 from .identified import Identified, Result, raise_unless_successful
-from .models import Model, named
-from .projections import AbstractProjection, ClosedWindows, Rows, WeakForm
+from .models import Model
+from .projections import AbstractProjection, Rows, WeakForm
+from .question import ask
 from .recording import Recording
 from .search import search
 from .terms.base import AbstractTerm, Scales, Sum, bounds as term_bounds, summands
@@ -48,17 +49,12 @@ def identify(
     **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, and,
     with `throw`, for any other failure.
     """
-    term = _structure(model)
-    batched = recording.time.ndim == 2
-    prepared = _prepare_batch(recording) if batched else signals.prepare(recording)
-    _check(term, projection, prepared)
-    width = _width(projection, prepared)
-    limits = tuple(sorted((name, tuple(map(float, pair))) for name, pair in (bounds or {}).items()))
-    solve = _identify_batch if batched else _identify
-    first = projection or (WeakForm(width) if _beyond_velocity(term) else ClosedWindows())
-    found = solve(term, prepared, first, width, limits, grid)
-    if projection is None and first != WeakForm(width) and _too_open(found):
-        found = solve(term, prepared, WeakForm(width), width, limits, grid)
+    question = ask(model, recording, projection, bounds, grid)
+    solve = solve_rows if recording.time.ndim == 2 else _identify
+    found = solve(*question)
+    weak = WeakForm(question.width)
+    if projection is None and question.projection != weak and _too_open(found):
+        found = solve(*question._replace(projection=weak))
     if throw:
         raise_unless_successful(found)
     return found
@@ -70,57 +66,10 @@ def _too_open(found: Identified) -> bool:
     return known and float(found.covered) < LEAST_COVERED
 
 
-def _width(projection: AbstractProjection | None, recording: Recording) -> int:
-    """Half-width of the weak form's kernel; a batch shares the median of a few rows' widths."""
-    if isinstance(projection, WeakForm):
-        return projection.half_width
-    if recording.time.ndim == 1 or signals.is_traced(recording):
-        return signals.kernel_half_width(recording)
-    count = recording.time.shape[0]
-    some = [jax.tree.map(lambda x, i=i: x[i], recording) for i in range(0, count, -(-count // 8))]
-    return sorted(signals.kernel_half_width(row) for row in some)[len(some) // 2]
-
-
-def _structure(model) -> AbstractTerm:
-    if isinstance(model, str):
-        return named(model)
-    if isinstance(model, Identified):
-        return model.model.term
-    return model.term if isinstance(model, Model) else model
-
-
-def _beyond_velocity(term: AbstractTerm) -> frozenset[str]:
-    return term.coordinates - {"velocity", "acceleration"}
-
-
-def _check(term, projection, recording):
-    beyond = _beyond_velocity(term)
-    if isinstance(projection, ClosedWindows) and beyond:
-        raise ValueError(
-            f"ClosedWindows leaves inertia out, which is exact only for functions of velocity; "
-            f"this model depends on {', '.join(sorted(beyond))} too, and acceleration is not "
-            "orthogonal to that. Use projection=jaxfric.WeakForm(...), or leave it to the default."
-        )
-    missing = {"position"} & beyond if recording.position is None else set()
-    missing |= {c for c in beyond if c not in ("position", "time") and c not in recording.channels}
-    if missing:
-        raise ValueError(
-            f"The model needs {', '.join(sorted(missing))}, which the recording lacks; "
-            f"it has {', '.join(['time', 'velocity', *recording.channels])}."
-        )
-
-
-def _prepare_batch(recording: Recording) -> Recording:
-    if recording.velocity is not None:
-        return recording
-    if signals.is_traced(recording):
-        return jax.vmap(signals.prepare)(recording)
-    widest = int(jnp.max(jax.vmap(signals.choose_half_width)(recording)))
-    return jax.vmap(lambda r: signals.prepare(r, widest))(recording)
-
-
 @eqx.filter_jit
-def _identify_batch(term, recording, projection, width, given, grid):
+def solve_rows(term, recording, projection, width, given, grid) -> Identified:
+    """What a [`Question`][jaxfric.question.Question] about a batch asks, row by row."""
+
     def one(row):
         return _identify(term, row, projection, width, given, grid)
 

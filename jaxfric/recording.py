@@ -11,6 +11,11 @@ from jaxtyping import Array, Bool, Float, Int
 
 from .units import SI
 
+# Padding goes to the next of these multiples of a power of two, so that one compiled program
+# serves many lengths; at most a fifth of the samples is padding.
+PADDING = (1.0, 1.25, 1.5, 1.75, 2.0)
+SHORTEST = 256
+
 
 def _array(value, dtype=None):
     """An array of jax; one of numpy is moved as it is, for which nothing is compiled."""
@@ -130,6 +135,14 @@ def pad(recording: Recording, length: int) -> Recording:
 
     padded = jax.tree.map(lambda x: lengthen(x, mode="edge"), recording)
     return eqx.tree_at(lambda r: r.mask, padded, lengthen(recording.mask))
+
+
+def uniform(recording: Recording) -> Recording:
+    """A recording without what makes one compiled program serve it alone: length, name, pieces."""
+    power = max(SHORTEST, 1 << (recording.num_samples.bit_length() - 1))
+    length = next(int(f * power) for f in PADDING if f * power >= recording.num_samples)
+    pieces = 1 << (recording.num_segments - 1).bit_length()
+    return dataclasses.replace(pad(recording, length), source="", num_segments=pieces)
 
 
 def stack(recordings: Sequence[Recording]) -> Recording:

@@ -199,17 +199,20 @@ def derivative(
     return _slope(recording, signal, jnp.asarray(half_width, signal.dtype), half_width)
 
 
-def prepare(recording: Recording, half_width: int | None = None) -> Recording:
+def prepare(
+    recording: Recording, half_width: int | None = None, reach: int | None = None
+) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
     A recorded velocity is kept. Else the velocity is the zero-phase smoothing derivative of the
     position, its width chosen from resolution and noise ([`choose_half_width`][]) or given in
-    samples. Samples that are not finite but valid by their mask stay: `identify` reports them.
+    samples (traced, where `reach` bounds it). Samples that are not finite but valid by their mask
+    stay: `identify` reports them.
     """
     if recording.velocity is not None:
         return recording
     if half_width is not None:
-        width, reach = jnp.asarray(half_width, recording.time.dtype), half_width
+        width, reach = jnp.asarray(half_width, recording.time.dtype), reach or half_width
     elif is_traced(recording):
         width, reach = choose_half_width(recording, TRACED_REACH), TRACED_REACH
     else:

@@ -12,6 +12,7 @@ import pytest
 import jaxfric
 from jaxfric import cli, documents, io, models
 from jaxfric.cli import commands, main
+from jaxfric.recording import PADDING, uniform
 
 ROOT = Path(__file__).parents[1]
 TRUTH = {
@@ -156,10 +157,10 @@ def test_padding_changes_nothing(axis, projection):
 @pytest.mark.parametrize("count", [1, 255, 256, 257, 321, 1000, 1024, 1025, 24841, 2**20 + 1])
 def test_padded_lengths_are_few_and_near(count):
     recording = jaxfric.Recording(np.arange(count), np.zeros(count), np.zeros(count))
-    length = commands.uniform(recording).num_samples
+    length = uniform(recording).num_samples
     assert count <= length <= max(256, 1.25 * count)
     mantissa = length / 2 ** int(np.log2(length))
-    assert mantissa in commands.PADDING
+    assert mantissa in PADDING
 
 
 def test_the_picture(axis, tmp_path):

@@ -15,7 +15,7 @@ ORDER = """
     units programs recording terms signals models catalogue effects
     columns delimited cleaning tables io
     small refine projections reduced compress uncertainty search
-    weighing identified identification selection online fleet
+    weighing identified question identification devices selection online fleet
     control plant prediction simulation scenario
     explanation concealed documents glossary tabulate proof report export cli __main__
 """.split()

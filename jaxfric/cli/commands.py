@@ -17,15 +17,10 @@ from ..io import read_with_notes, write_bytes, write_table, write_text
 from ..models import Model
 from ..programs import kept_in
 from ..projections import AbstractProjection, ClosedWindows, WeakForm
-from ..recording import Recording, pad
+from ..recording import Recording, uniform
 from ..signals import kernel_half_width, prepare
 from ..units import SI
 from .options import message
-
-# A file is padded to the next of these multiples of a power of two, so that one compiled program
-# serves many files; at most a fifth of the samples is padding.
-PADDING = (1.0, 1.25, 1.5, 1.75, 2.0)
-SHORTEST = 256
 
 
 def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[str]]:
@@ -37,14 +32,6 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
         units=arguments.units,
         **more,
     )
-
-
-def uniform(recording: Recording) -> Recording:
-    """A recording without what makes one compiled program serve it alone: length, name, pieces."""
-    power = max(SHORTEST, 1 << (recording.num_samples.bit_length() - 1))
-    length = next(int(f * power) for f in PADDING if f * power >= recording.num_samples)
-    pieces = 1 << (recording.num_segments - 1).bit_length()
-    return dataclasses.replace(pad(recording, length), source="", num_segments=pieces)
 
 
 def fitted(
