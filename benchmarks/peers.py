@@ -43,6 +43,17 @@ def problem(samples, name="gaussian"):
     return term, ready, rows, bounds(term, size)
 
 
+def again(samples, seed):
+    """Prepared recording, rows and bounds of another axis of the same kind."""
+    ready = prepare(axis(samples, seed))
+    size = scales(ready)
+    return (
+        ready,
+        ClosedWindows().rows(ready, size),
+        bounds(_without_inertia(named("gaussian")), size),
+    )
+
+
 def directions(ready, rows):
     """Speed, force along the motion and root weight of each direction's samples, as arrays."""
     for weight, sign in ((rows.positive, 1.0), (rows.negative, -1.0)):
