@@ -71,7 +71,7 @@ def many(documents: Sequence[Mapping[str, Any]]) -> str:
         rows = [[row[0], *row[2:]] for row in rows]
     numeric = range(1 if same_model else 2, len(rows[0]) - 1)
     lines = [f"model {documents[0]['name']}", ""] if same_model else []
-    lines += _aligned(rows, numeric)
+    lines += aligned(rows, numeric)
     lines += ["", "~ the 95 % interval is wider than the value; - not visible; intervals: --json"]
     for result, diagnosis in dict.fromkeys((d["result"], d["diagnosis"]) for d in documents):
         if diagnosis != FINE:
@@ -130,10 +130,10 @@ def _rows(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> l
             entry["unit"],
         ]
         table.append(row + ([f"{truth[name]:.5g}"] if truth else []))
-    return _aligned(table, (1, 2, 4))
+    return aligned(table, (1, 2, 4))
 
 
-def _aligned(table: Sequence[Sequence[str]], numeric: Sequence[int]) -> list[str]:
+def aligned(table: Sequence[Sequence[str]], numeric: Sequence[int]) -> list[str]:
     """Columns of one width each, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return [
@@ -215,11 +215,11 @@ def explanation(document: Mapping[str, Any]) -> str:
             name = place["coordinate"].replace("_", " ")
             share, chance = f"{place['share']:.0%}", f"{place['p_value']:.3f}"
             rows.append([name, share, chance, place["detail"]])
-        lines += ["", *_aligned(rows, (1, 2))]
+        lines += ["", *aligned(rows, (1, 2))]
     if document["not_visible"]:
         rows = [["not found, would have been seen from", "", ""]]
         for entry in document["not_visible"]:
             name = entry["effect"].replace("_", " ")
             rows.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
-        lines += ["", *_aligned(rows, (1,))]
+        lines += ["", *aligned(rows, (1,))]
     return "\n".join(lines)

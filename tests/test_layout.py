@@ -15,9 +15,9 @@ ORDER = """
     units programs recording terms signals models catalogue effects
     columns delimited cleaning tables io
     small refine projections reduced compress uncertainty search
-    weighing identified question identification devices selection online fleet
+    weighing identified question identification devices selection online
     control plant prediction simulation scenario
-    explanation concealed documents glossary tabulate proof report export cli __main__
+    explanation concealed documents glossary tabulate fleet proof report export cli __main__
 """.split()
 
 FILES = sorted(PACKAGE.rglob("*.py"))

@@ -122,6 +122,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_export,
         _add_models,
         _add_effects,
+        _add_fleet,
         _add_prove,
     ):
         add(commands)
@@ -155,6 +156,20 @@ def _add_identify(commands) -> None:
         metavar="NAME",
         help="a name that jaxfric models lists, or best: held-out data choose (default: gaussian)",
     )
+    _identifying(command)
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the identification; - prints it"
+    )
+    command.add_argument(
+        "--save", type=options.output, metavar="MODEL.json", help="write the identified model"
+    )
+    command.add_argument(
+        "--plot", type=options.picture, metavar="OUT.png", help="draw it (extra: report)"
+    )
+    options.reading(command)
+
+
+def _identifying(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--projection",
         choices=("auto", "closed-windows", "weak-form"),
@@ -168,16 +183,6 @@ def _add_identify(commands) -> None:
         metavar="NAME=LOW:HIGH,…",
         help="of nonlinear parameters, for instance stribeck_velocity+=0.001:0.1",
     )
-    command.add_argument(
-        "--json", type=options.output, metavar="OUT", help="write the identification; - prints it"
-    )
-    command.add_argument(
-        "--save", type=options.output, metavar="MODEL.json", help="write the identified model"
-    )
-    command.add_argument(
-        "--plot", type=options.picture, metavar="OUT.png", help="draw it (extra: report)"
-    )
-    options.reading(command)
 
 
 def _add_explain(commands) -> None:
@@ -284,6 +289,48 @@ def _add_effects(commands) -> None:
         metavar="OUT",
         help="as JSON, printed or written",
     )
+
+
+def _add_fleet(commands) -> None:
+    command = _add(commands, "fleet", "fleet.run", "many recordings, streamed, resumable")
+    command.add_argument(
+        "patterns",
+        nargs="+",
+        metavar="PATTERN",
+        help="'logs/**/*.parquet' (quoted), files, or folders",
+    )
+    command.add_argument(
+        "--model", default="gaussian", metavar="NAME", help="as jaxfric models lists them"
+    )
+    command.add_argument(
+        "--out", required=True, metavar="FITS.parquet", help="one row a recording; or .csv"
+    )
+    command.add_argument(
+        "--plot", type=options.picture, metavar="OUT.png", help="draw the fleet (extra: report)"
+    )
+    command.add_argument(
+        "--axis",
+        metavar="KEY_OR_REGEX",
+        help="which axis a path is of, for drift (default: folders named key=value)",
+    )
+    command.add_argument(
+        "--group", metavar="KEY_OR_REGEX", help="outliers within groups (default: the whole fleet)"
+    )
+    _identifying(command)
+    command.add_argument(
+        "--jobs", type=options.count, metavar="K", help="cores to use (default: all)"
+    )
+    command.add_argument(
+        "--restart", action="store_true", help="forget the rows of an interrupted run"
+    )
+    command.add_argument(
+        "--process",
+        type=options.process,
+        metavar="I/N@HOST:PORT",
+        help="the I-th, from 0, of N such commands on machines that share the folders; "
+        "process 0 is reached at HOST:PORT",
+    )
+    options.reading(command)
 
 
 def _add_prove(commands) -> None:

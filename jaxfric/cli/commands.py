@@ -70,7 +70,7 @@ def identify(arguments: Namespace) -> int:
     """`jaxfric identify`: one recording in full, or many in a table."""
     many = len(arguments.files) > 1
     if arguments.model != "best":
-        _check(arguments.model, arguments.bounds)
+        check_bounds(arguments.model, arguments.bounds)
     if many and (arguments.plot or arguments.save):
         raise ValueError("--plot and --save take one recording; for many, use --json.")
     if arguments.plot:
@@ -79,14 +79,14 @@ def identify(arguments: Namespace) -> int:
         pictures.library()
     done, failures = [], 0
     for i, path in enumerate(arguments.files):
-        _progress(f"{i + 1}/{len(arguments.files)} {path}")
+        show_progress(f"{i + 1}/{len(arguments.files)} {path}")
         try:
             done.append(_identify(path, arguments))
         except (ValueError, OSError) as error:
-            _progress("")
+            show_progress("")
             print(f"jaxfric identify: {message(error)}", file=sys.stderr)
             failures += 1
-    _progress("")
+    show_progress("")
     if arguments.json != "-" and done:
         alone = arguments.projection == "auto"
         text = tabulate.many(done) if many else tabulate.identification(done[0], automatic=alone)
@@ -96,7 +96,8 @@ def identify(arguments: Namespace) -> int:
     return 2 if failures else 0
 
 
-def _check(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
+def check_bounds(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
+    """Raises `ValueError` for a model that is not known, and for bounds of what it has not."""
     searched = [p.name for p in known.named(model).nonlinear]
     if unknown := sorted(set(bounds) - set(searched)):
         raise ValueError(
@@ -136,7 +137,7 @@ def put(path: str, text: str) -> None:
         write_text(path, text)
 
 
-def _progress(text: str) -> None:
+def show_progress(text: str) -> None:
     """One line on standard error that the next one replaces; only on a terminal."""
     if sys.stderr.isatty():
         print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)

@@ -105,6 +105,19 @@ def count(text: str) -> int:
     return value
 
 
+def process(text: str) -> tuple[int, int, str]:
+    """`i/n@host:port` as the number of a process, how many there are, and the address of the
+    first.
+    """
+    place, _, address = text.partition("@")
+    index, _, total = place.partition("/")
+    host, _, port = address.rpartition(":")
+    numbers = all(part.isdecimal() for part in (index, total, port))
+    if not (numbers and host and int(index) < int(total)):
+        raise ArgumentTypeError(f"{text!r} is not of the form I/N@HOST:PORT with I from 0 to N-1")
+    return int(index), int(total), address
+
+
 def sizes(text: str) -> tuple[float, float]:
     """`low:high`, or one number for both; shares from over 0 to 1."""
     low, _, high = text.partition(":")

@@ -1,0 +1,145 @@
+"""Rows kept as they are made, so that an interrupted run goes on where it was.
+
+Beside the output stands a folder `OUT.partial` with one file a process: a line that says what is
+being done, then one line a row. Lines are only ever added. A process that dies in the middle of
+one leaves a line without its end, which the next run cuts off; so no row is lost or there twice.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from .files import File
+
+SCHEMA = "jaxfric.fleet/1"
+Row = dict[str, Any]
+
+
+def folder(out: str | os.PathLike) -> Path:
+    """Where the rows of an output are kept until it is whole."""
+    return Path(f"{os.fspath(out)}.partial")
+
+
+def forget(out: str | os.PathLike) -> None:
+    """Remove the rows that an interrupted run has left for an output."""
+    shutil.rmtree(folder(out), ignore_errors=True)
+
+
+class Journal:
+    """The rows made so far for an output; a context manager that holds them against others.
+
+    **Arguments:** `out`, the output; `task`, all options that the rows depend on; `part`, the
+    number of this process.
+
+    **Raises:** `ValueError` if the folder cannot be written to, holds rows made with other
+    options, or is being written to by another run.
+    """
+
+    def __init__(self, out: str | os.PathLike, task: Mapping[str, Any], part: int = 0):
+        self._out, self.folder = out, folder(out)
+        self._task = {"schema": SCHEMA, "jaxfric": _version(), "task": _plain(task)}
+        self._path = self.folder / f"rows-{part}.jsonl"
+
+    def __enter__(self) -> "Journal":
+        try:
+            self.folder.mkdir(exist_ok=True)
+            self._check()
+            self._file = self._path.open("ab")
+        except OSError as error:
+            raise ValueError(
+                f"{self.folder}: cannot be written: {error.strerror}. The rows are kept there "
+                "until the output is whole; is its folder there, and yours?"
+            ) from error
+        self._lock()
+        self._mend()
+        if not self._file.tell():
+            self._append([self._task])
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+    def add(self, rows: Iterable[tuple[File, Row]]) -> None:
+        """Keep rows; when this returns they are on the disk."""
+        self._append(
+            {"file": f.path, "size": f.size, "changed": f.changed, "row": row} for f, row in rows
+        )
+
+    def rows(self, files: Iterable[File]) -> dict[str, Row]:
+        """The rows, by path, of those files that are as they were; of all processes' journals."""
+        wanted = {file.path: file for file in files}
+        found = {}
+        for path in sorted(self.folder.glob("rows-*.jsonl")):
+            for line in _lines(path)[1:]:
+                file = wanted.get(line["file"])
+                if file and (file.size, file.changed) == (line["size"], line["changed"]):
+                    found[file.path] = line["row"]
+        return found
+
+    def remove(self) -> None:
+        """The output is whole: the folder goes."""
+        forget(self._out)
+
+    def _check(self) -> None:
+        for path in self.folder.glob("rows-*.jsonl"):
+            head = next(iter(_lines(path)), self._task)
+            if head != self._task:
+                raise ValueError(
+                    f"{self.folder}: holds rows made with {_difference(head, self._task)}. Give "
+                    "those options to go on with them, or --restart to begin anew."
+                )
+
+    def _lock(self) -> None:
+        with suppress(ImportError):  # no such locks on Windows
+            import fcntl
+
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                self._file.close()
+                raise ValueError(f"{self._path}: another run is writing to it.") from error
+
+    def _mend(self) -> None:
+        """Cut off a line without its end."""
+        content = self._path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole < len(content):
+            os.truncate(self._path, whole)
+        self._file.seek(0, os.SEEK_END)
+
+    def _append(self, lines: Iterable[Mapping[str, Any]]) -> None:
+        text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines)
+        try:
+            self._file.write(text.encode("utf-8"))
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise ValueError(f"{self._path}: cannot be written: {error.strerror}.") from error
+
+
+def _lines(path: Path) -> list[dict[str, Any]]:
+    content = path.read_bytes()
+    return [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
+
+
+def _plain(value: Any) -> Any:
+    return json.loads(json.dumps(value))
+
+
+def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
+    if theirs.get("schema") != SCHEMA or theirs["jaxfric"] != ours["jaxfric"]:
+        return f"another version of jaxfric ({theirs.get('jaxfric')})"
+    pairs = ((name, theirs["task"].get(name), value) for name, value in ours["task"].items())
+    return ", ".join(f"{name} {old}, not {new}" for name, old, new in pairs if old != new)
+
+
+def _version() -> str:
+    try:
+        return version("jaxfric")
+    except PackageNotFoundError:
+        return ""
