@@ -39,7 +39,7 @@ def with_channels(model: Model, recording: Recording) -> Recording:
 
     Faults of the actuator act on the force f that the motion needs, which the terms without faults
     predict: `predicted_force`, N; `predicted_friction`, the part of it that depends on velocity
-    alone, N; `predicted_jerk`, m/s³. Channels that are there already stay.
+    alone, N. Channels that are there already stay.
     """
     read = {name for name in model.term.coordinates if name.startswith("predicted_")}
     if not read - set(recording.channels):
@@ -54,7 +54,6 @@ def with_channels(model: Model, recording: Recording) -> Recording:
     made = {
         "predicted_force": sound.force(recording) + rate(sound.momentum(recording)),
         "predicted_friction": sound.friction(recording.velocity),
-        "predicted_jerk": rate(rate(recording.velocity)),
     }
     return dataclasses.replace(recording, channels=made | recording.channels)
 

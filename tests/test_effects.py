@@ -45,9 +45,9 @@ CASES = {
     "lag": (T.ActuatorLag(), (0.002,)),
     "dahl": (T.Dahl(0.002), (18.0,)),
     "lugre": (T.LuGre(0.002, 0.02), (18.0, 5.0)),
-    "frictional_lag": (T.FrictionalLag(), (0.01,)),
+    "frictional_lag": (T.FrictionalLag(0.2), (0.1,)),
     "backlash": (T.Backlash(0.003), (3.0,)),
-    "compliance": (T.Compliance(), (1e-3,)),
+    "compliance": (T.Compliance(2.0, 0.1), (3.0,)),
     "thermal_viscous": (T.ThermalDrift(T.Viscous(), 4.0), (15.0,)),
     "thermal_coulomb": (T.ThermalDrift(T.Coulomb(), 3.0, start=-1.0), (2.0,)),
     "thermal_stribeck": (T.ThermalDrift(T.Gaussian(0.05), 3.0), (5.0,)),
@@ -77,7 +77,6 @@ def motion(force=1.0, position=1.0, count=12):
     channels = {
         "predicted_force": force * 30 * np.sin(2 * t + 1),
         "predicted_friction": force * (20 * np.sign(v) + 60 / position * v),
-        "predicted_jerk": position * 0.5 * np.cos(3 * t),
         "neighbour_velocity": position * 0.1 * np.sin(2 * t),
         "load": force * (5 + np.sin(t)),
     }
@@ -371,7 +370,6 @@ def with_predictions(run, model):
     channels = {
         "predicted_force": inertia * acceleration + friction,
         "predicted_friction": friction + 8 * np.sign(v) * np.exp(-((v / 0.02) ** 2)),
-        "predicted_jerk": np.gradient(acceleration) * rate,
         "neighbour_velocity": other,
         "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
     }

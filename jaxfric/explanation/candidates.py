@@ -8,7 +8,7 @@ import numpy as np
 from .. import terms as laws
 from ..catalogue import CATALOGUE, Effect
 from ..terms.base import AbstractTerm, Directional, summands
-from .evidence import Evidence
+from .evidence import NODES, Evidence
 from .regression import Space
 
 # Points of a grid over one nonlinear parameter, where nothing finer is needed below.
@@ -112,7 +112,7 @@ def scaled(raw: np.ndarray) -> np.ndarray:
 def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     """Every term of the catalogue that this recording has the signals for."""
     limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
-    have = {"predicted_force", "predicted_friction", "predicted_jerk", *evidence.motion.channels}
+    have = {"predicted_force", "predicted_friction", *evidence.motion.channels}
     if evidence.motion.position is not None:
         have.add("position")
     found = []
@@ -148,6 +148,8 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
         yield Candidate(effect, term, tones[:, None], Lines("time", False))
     elif kind is laws.StickySpot:
         yield Candidate(effect, term, _spots(evidence))
+    elif kind is laws.Compliance:
+        yield Candidate(effect, term, _resonances(term, evidence))
     elif kind is laws.PositionDependentInertia:
         stroke = evidence.limits.high - evidence.limits.low
         periods = stroke / np.concatenate([2.0 ** np.arange(-3, 0, 0.5), np.arange(1, 8, 0.25)])
@@ -166,6 +168,18 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     fine = 8 * GRID if isinstance(term, laws.FrictionStep) else GRID
     along = (np.arange(fine) + 0.5) / fine
     return space.beta(np.repeat(along[:, None], count, axis=1))
+
+
+# Damping ratios tried: a drive train's, a belt's, a soft coupling's.
+_DAMPING = (0.05, 0.15, 0.45)
+
+
+def _resonances(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
+    """Frequencies up to what the nodes still resolve, with a few dampings each."""
+    corners = Space([term], evidence).beta(np.array([[0.0, 0.0], [1.0, 1.0]]))
+    low, most = corners[:, 0]
+    high = max(min(most, 0.5 * NODES / evidence.reach), 2 * low)
+    return np.array([(f, z) for z in _DAMPING for f in np.geomspace(low, high, GRID)])
 
 
 def _spots(evidence: Evidence) -> np.ndarray:

@@ -18,6 +18,8 @@ BLOCKS = 24
 # A block is this many half-widths of the kernel long, so that neighbours hardly share noise; on
 # short records half of that.
 BLOCK_LENGTH = 8
+# What is believed would be as large by chance somewhere in one case of a hundred.
+LEVEL = 0.01
 # Fewer blocks have fewer patterns of signs than a p-value of 1 % needs to rest on.
 FEWEST = 8
 DRAWS = 499

@@ -139,9 +139,7 @@ def gather(
     **Raises:** `ValueError` if the axis hardly slips.
     """
     count = recording.num_samples
-    # The name and the number of segments would be compiled in.
-    nameless = dataclasses.replace(recording, source="", num_segments=1)
-    prepared = signals.prepare(pad(nameless, _octave(count)))
+    prepared = lengthened(recording)
     width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
     limits = Scales(*(float(x) for x in _scales(prepared)))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
@@ -181,6 +179,13 @@ def gather(
         width=step * NODES,
         clock=bool(np.all(np.diff(time) > 0)),
     )
+
+
+def lengthened(recording: Recording) -> Recording:
+    """The recording with its velocity, of one of few lengths, so that few programs are compiled."""
+    # The name and the number of segments would be compiled in.
+    nameless = dataclasses.replace(recording, source="", num_segments=1)
+    return signals.prepare(pad(nameless, _octave(recording.num_samples)))
 
 
 _scales = eqx.filter_jit(signals.scales)

@@ -20,7 +20,7 @@ from .naming import Named, contest, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .telling import tell
-from .timing import settled
+from .timing import late, settled
 
 
 def explain(
@@ -69,7 +69,14 @@ def _double(tree, dtype=float):
 def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: int) -> Explanation:
     known = _known(baseline, seed)
     asked, found = pursue(recording, holdout, known.structure, seed)
-    found = settled(recording, asked, _verified(found, asked, known.structure, seed))
+    found = _verified(found, asked, known.structure, seed)
+    lateness = late(recording, asked, found)
+    if lateness is not None:
+        # To first order a delay is a column; what it leaves of second order would be named too.
+        later = None if holdout is None else lateness.undone(holdout)
+        there, behind = pursue(lateness.undone(recording), later, known.structure, seed)
+        behind = _verified(behind, there, known.structure, seed)
+        found = settled(found, behind, lateness, asked)
     wrong = None
     if known.model is not None:
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)

@@ -7,16 +7,15 @@ import numpy as np
 from ..terms import DisturbancePulses
 from ..terms.base import AbstractTerm
 from .candidates import Candidate, Field, scaled
-from .chance import DRAWS, Judge, adjusted, blocks, thresholds
+from .chance import DRAWS, LEVEL, Judge, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .predictions import with_predictions
 from .pulses import pulses
 from .regression import Fit, fit
 
-# A term is believed if chance would do as well somewhere in one case of a hundred.
-LEVEL = 0.01
-# And if it accounts for this much of the mean-square residual: below it, the amplitude is under a
-# sixth of the residual's, where held forces, counts and smoothed velocities leave their own traces.
+# A term is believed if it accounts for this much of the mean-square residual, too: below it, the
+# amplitude is under a sixth of the residual's, where held forces, counts and smoothed velocities
+# leave their own traces.
 LEAST_SHARE = 0.03
 LATER_SHARE = 0.05
 MOST_TERMS = 4
@@ -115,7 +114,10 @@ def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
 def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
     done, basis = [], now.basis()
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
-    enough = 0.5 * trials[0].score(trials[0].gain, size) - RIVAL
+    # A sharp term may not be confirmed, and must not keep the next best from being looked at.
+    blunt = [t for t in trials if t.candidate.effect.name not in SHARP]
+    leader = (blunt or trials)[0]
+    enough = 0.5 * leader.score(leader.gain, size) - RIVAL
     for number, trial in enumerate(trials):
         found = None
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
@@ -316,8 +318,8 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit | None):
 def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 
-    There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly: a column of
-    noise changes its amplitude by more than half, a column of physics does not.
+    There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly: of a column
+    of noise what the rest cannot imitate changes by more than half, of one of physics it does not.
     """
     if wide is None:
         return True
@@ -325,7 +327,12 @@ def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float
     seen = with_predictions(wide, less)
     terms = (*now.terms, finalist.trial.candidate.term)
     more = fit(terms, seen, (*less.betas, finalist.betas[-1]), 6)
-    ratio = float(np.linalg.norm(more.alphas[-1]) / np.linalg.norm(finalist.alpha))
+    term, basis = finalist.trial.candidate.term, less.basis()
+    forces = []
+    for beta, alpha in ((more.betas[-1], more.alphas[-1]), (finalist.betas[-1], finalist.alpha)):
+        force = seen.columns(term, beta[None])[0] @ alpha
+        forces.append(float(np.linalg.norm(force - basis @ (basis.T @ force))))
+    ratio = forces[0] / max(forces[1], 1e-300)
     positive = bool(np.all(more.alphas[-1] > 0))
     return positive and 0.5 < ratio < 2 and less.energy - more.energy >= least * less.energy
 

@@ -12,8 +12,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """The evidence with the channels that some terms read, at the nodes.
 
     `predicted_force` û, N (the measured force in its place would explain itself);
-    `predicted_friction`, what of it depends on velocity alone, N; `predicted_acceleration`,
-    m/s²; `predicted_jerk`, m/s³.
+    `predicted_friction`, what of it depends on velocity alone, N; `predicted_acceleration`, m/s².
     """
     count = evidence.motion.num_samples
     friction, other, momentum = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -29,12 +28,10 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
             other = other + alpha @ np.asarray(plain[0])
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving[0])
-    acceleration = rate(evidence, np.asarray(evidence.motion.velocity))
     return evidence.with_channels(
         predicted_force=friction + other + rate(evidence, momentum),
         predicted_friction=friction,
-        predicted_acceleration=acceleration,
-        predicted_jerk=rate(evidence, acceleration),
+        predicted_acceleration=rate(evidence, np.asarray(evidence.motion.velocity)),
     )
 
 

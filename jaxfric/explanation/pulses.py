@@ -1,10 +1,13 @@
 """Isolated pushes: candidates whose places the residual itself has to say."""
 
+from math import comb
+
 import numpy as np
 
 from .. import terms as laws
 from ..effects import EFFECTS
 from .candidates import Candidate
+from .chance import LEVEL
 from .evidence import Evidence
 from .regression import Fit
 
@@ -31,6 +34,8 @@ def pulses(evidence: Evidence, now: Fit) -> list[Candidate]:
         places = _outstanding(now.residual, time, width, spacing)
         if not places or 2 * width * len(places) > LARGEST_PART * (time[-1] - time[0]):
             continue
+        if _at_reversals(evidence, places, width):
+            continue
         candidate = Candidate(
             EFFECTS["disturbance_pulses"],
             laws.DisturbancePulses(tuple(places), float(width)),
@@ -41,6 +46,33 @@ def pulses(evidence: Evidence, now: Fit) -> list[Candidate]:
         if gain > best:
             best, found = gain, candidate
     return [] if found is None else [found]
+
+
+def _at_reversals(evidence: Evidence, places: list[float], width: float) -> bool:
+    """Whether the pushes seek the reversals: then they are what a reversal does, no isolated ones.
+
+    Had they nothing to do with reversals, as many as that would lie beside one by chance in one
+    case of a hundred.
+    """
+    time, velocity = evidence.elapsed[: evidence.nodes], np.asarray(evidence.motion.velocity)
+    turns = time[1:][np.diff(np.sign(velocity[: evidence.nodes])) != 0]
+    if not len(turns):
+        return False
+    near = width + 2 * evidence.reach
+
+    def beside(moments):
+        after = np.searchsorted(turns, moments)
+        around = turns[np.clip(np.stack([after - 1, after]), 0, len(turns) - 1)]
+        return np.min(np.abs(around - moments), axis=0) < near
+
+    chance = float(np.mean(beside(evidence.elapsed[evidence.centre])))
+    clock = np.asarray(evidence.motion.time)[: evidence.nodes]
+    count = int(np.sum(beside(np.interp(places, clock, time))))
+    total = len(places)
+    tail = [
+        comb(total, k) * chance**k * (1 - chance) ** (total - k) for k in range(count, total + 1)
+    ]
+    return sum(tail) <= LEVEL
 
 
 def _outstanding(residual, time, width, spacing) -> list[float]:

@@ -12,6 +12,7 @@ from .chance import blocks
 from .evidence import Evidence, gather
 from .predictions import with_predictions
 from .regression import Fit, fit
+from .reversals import yields
 
 # Alignments that differ by less than this part of a sample make no difference worth another search.
 ALIGNED = 0.1
@@ -20,7 +21,8 @@ ALIGNED = 0.1
 class Question(NamedTuple):
     """A recording through a kernel and one of twice the width, its base fit, the held-out one.
 
-    `delay`: how much later the force was taken, s; `block`: of each row; `structure`: the baseline.
+    `delay`: how much later the force was taken, s; `block`: of each row; `structure`: the baseline;
+    `reversals`: whether rows reach across reversals, where the axis moves instead of sticking.
     """
 
     evidence: Evidence
@@ -30,6 +32,7 @@ class Question(NamedTuple):
     block: np.ndarray
     structure: AbstractTerm
     delay: float
+    reversals: bool = False
 
 
 def ask(
@@ -56,12 +59,16 @@ def ask(
         wide = None if wide is None else gather(motion, wide.width, delay)
         if abs(delay - before) < 0.5 * ALIGNED * sample:
             break
+    across = yields(motion, evidence, known)
+    if across:
+        evidence = gather(motion, evidence.width, delay, across)
+        wide = gather(motion, 2 * evidence.width, delay, across)
     held = None
     if holdout is not None:
-        held = gather(from_position(holdout), evidence.width, delay)
+        held = gather(from_position(holdout), evidence.width, delay, across)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    return Question(evidence, wide, held, base, block, structure, delay)
+    return Question(evidence, wide, held, base, block, structure, delay, across)
 
 
 def _wider(recording: Recording, width: int) -> Evidence | None:

@@ -83,10 +83,29 @@ class Beside:
         return rows - self.basis @ (self.basis.T @ rows)
 
 
+class Remembered:
+    """Rows that remember columns: in a step most terms stay where they are."""
+
+    def __init__(self, rows: "Evidence | Beside"):
+        self.rows, self.limits, self.target = rows, rows.limits, rows.target
+        self._known: dict[tuple[int, bytes], np.ndarray] = {}
+
+    def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
+        """Rows of a term's columns at many β, `(G, d)` to `(G, J, p)`."""
+        keys = [(id(term), beta.tobytes()) for beta in betas]
+        new = [i for i, key in enumerate(keys) if key not in self._known]
+        if len(new) > GRID // 2:  # a grid is seen once
+            return self.rows.columns(term, betas)
+        if new:
+            fresh = self.rows.columns(term, betas[new])
+            self._known |= {keys[i]: columns for i, columns in zip(new, fresh, strict=True)}
+        return np.stack([self._known[key] for key in keys])
+
+
 class Space:
     """The compact set of the nonlinear parameters of some terms, in coordinates from 0 to 1."""
 
-    def __init__(self, terms: Sequence[AbstractTerm], evidence: "Evidence | Beside"):
+    def __init__(self, terms: Sequence[AbstractTerm], evidence: "Evidence | Beside | Remembered"):
         limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
         boxes = [_box(term, limits) for term in terms]
         self.counts = [len(term.nonlinear) for term in terms]
@@ -132,7 +151,7 @@ def fit(
     result's columns and residual are what those leave.
     """
     terms = tuple(terms)
-    rows: Evidence | Beside = evidence if beside is None else Beside(evidence, beside)
+    rows = Remembered(evidence if beside is None else Beside(evidence, beside))
     space = Space(terms, rows)
     if not sum(space.counts):
         return _at(terms, rows, space, np.zeros(0), derivatives=True)

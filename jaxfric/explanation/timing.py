@@ -6,7 +6,8 @@ better account, by how much noise of the force each of them would leave on its o
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,7 +17,7 @@ from ..effects import EFFECTS
 from ..recording import Recording
 from .candidates import Candidate
 from .evidence import gather
-from .naming import RIVAL, Named, Taken
+from .naming import OF_BASE, RIVAL, Named, Taken
 from .predictions import with_predictions
 from .question import Question, from_position
 from .regression import fit
@@ -26,29 +27,73 @@ LATE = (laws.TransportDelay, laws.ActuatorLag)
 TRIED = np.geomspace(0.6, 1.7, 9)
 
 
-def settled(recording: Recording, asked: Question, found: Named) -> Named:
-    """The findings with a delay or lag under its right name, if the recording tells them apart."""
+class Late(NamedTuple):
+    """A force that acts late: the effect's name, its time, s, and how to undo it.
+
+    `place`: of its term in the fit; `taken`: what was found, under its right name.
+    """
+
+    time: float
+    undo: Callable[[Recording, float], Recording]
+    place: int
+    taken: Taken
+
+    def undone(self, recording: Recording) -> Recording:
+        """The recording with its force where it belongs."""
+        return self.undo(from_position(recording), self.time)
+
+
+def late(recording: Recording, asked: Question, found: Named) -> Late | None:
+    """The delay or lag among the findings under its right name, where there is one."""
     start = len(found.last.terms) - len(found.taken)
     places = [i for i, term in enumerate(found.last.terms) if isinstance(term, LATE)]
     if len(places) != 1 or places[0] < start:
-        return found
+        return None
     place = places[0]
     guess = float(found.last.alphas[place][0])
     if guess <= 0:
-        return found
+        return None
     motion = from_position(recording)
-    shares = {}
-    for name, undo in (("transport_delay", _earlier), ("actuator_lag", _lagged)):
-        shares[name] = _least(undo, motion, asked, found, place, guess)
+    ways = {"transport_delay": _earlier, "actuator_lag": _lagged}
+    least = {name: _least(undo, motion, asked, found, place, guess) for name, undo in ways.items()}
     size = found.left.size
-    gap = 0.5 * size * np.log(shares["actuator_lag"][0] / shares["transport_delay"][0])
+    gap = 0.5 * size * np.log(least["actuator_lag"][0] / least["transport_delay"][0])
     best = "transport_delay" if gap > 0 else "actuator_lag"
     other = ({"transport_delay", "actuator_lag"} - {best}).pop()
     taken = found.taken[place - start]
-    rivals = tuple(r for r in taken.rivals if r not in ("transport_delay", "actuator_lag"))
+    rivals = tuple(r for r in taken.rivals if r not in ways)
     if abs(gap) < RIVAL:
         rivals = (other, *rivals)
-    return _renamed(found, place, best, shares[best][1], taken._replace(rivals=rivals))
+    return Late(least[best][1], ways[best], place, _renamed(taken, best, rivals))
+
+
+def _renamed(taken: Taken, name: str, rivals: tuple[str, ...]) -> Taken:
+    kind = laws.TransportDelay if name == "transport_delay" else laws.ActuatorLag
+    candidate = Candidate(EFFECTS[name], kind(), taken.trial.candidate.betas)
+    return taken._replace(trial=taken.trial._replace(candidate=candidate), rivals=rivals)
+
+
+def settled(found: Named, behind: Named, lateness: Late, asked: Question) -> Named:
+    """What was found once the force was put back, `behind`, beside the delay or lag itself."""
+    others = [t for t in behind.taken if not isinstance(t.trial.candidate.term, LATE)]
+    kept = [i for i, term in enumerate(behind.last.terms) if not isinstance(term, LATE)]
+    terms = [*(behind.last.terms[i] for i in kept), lateness.taken.trial.candidate.term]
+    betas = [*(behind.last.betas[i] for i in kept), np.zeros(0)]
+    evidence = with_predictions(asked.evidence, behind.last)
+    now = fit(terms, evidence, betas, 6)
+    for number in reversed(range(len(others))):
+        place = len(terms) - 1 - len(others) + number
+        less = fit(_but(terms, place), evidence, _but(now.betas, place), 6)
+        # As for any later term: a part of what the baseline left, not only of what is left now.
+        if less.energy - now.energy < OF_BASE * found.base.energy:
+            terms, others, now = _but(terms, place), _but(others, number), less
+    now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
+    return found._replace(last=now, taken=[*others, lateness.taken], left=behind.left)
+
+
+def _but(items: Sequence, place: int) -> list:
+    """All items but one."""
+    return [item for i, item in enumerate(items) if i != place]
 
 
 def _least(undo: Callable, motion, asked, found, place, guess) -> tuple[float, float]:
@@ -65,11 +110,12 @@ def _least(undo: Callable, motion, asked, found, place, guess) -> tuple[float, f
 def _energy(undo, motion, asked: Question, found: Named, place: int, time: float) -> float:
     keep = [i for i in range(len(found.last.terms)) if i != place]
     width = asked.evidence.width
-    view = gather(undo(motion, time), width, asked.delay)
+    view = gather(undo(motion, time), width, asked.delay, asked.reversals)
     terms, betas = [found.last.terms[i] for i in keep], [found.last.betas[i] for i in keep]
     now = fit(terms, with_predictions(view, found.last), betas, 3)
     noise = np.random.default_rng(0).normal(size=motion.num_samples)
-    hiss = gather(undo(dataclasses.replace(motion, force=jnp.asarray(noise)), time), width)
+    hiss = dataclasses.replace(motion, force=jnp.asarray(noise))
+    hiss = gather(undo(hiss, time), width, reversals=asked.reversals)
     return now.energy / float(np.mean(hiss.target**2))
 
 
@@ -98,15 +144,3 @@ def _lagged(motion: Recording, lag: float) -> Recording:
             state = k * (state - before + slope * lag) + u - slope * lag
         out[i], before = state, u
     return dataclasses.replace(motion, force=jnp.asarray(out))
-
-
-def _renamed(found: Named, place: int, name: str, time: float, taken: Taken) -> Named:
-    kind = laws.TransportDelay if name == "transport_delay" else laws.ActuatorLag
-    terms, alphas = list(found.last.terms), list(found.last.alphas)
-    terms[place], alphas[place] = kind(), np.array([time])
-    candidate = Candidate(EFFECTS[name], kind(), taken.trial.candidate.betas)
-    taken = taken._replace(trial=taken.trial._replace(candidate=candidate))
-    number = place - (len(found.last.terms) - len(found.taken))
-    all_taken = [taken if i == number else t for i, t in enumerate(found.taken)]
-    last = found.last._replace(terms=tuple(terms), alphas=tuple(alphas))
-    return found._replace(last=last, taken=all_taken)

@@ -14,8 +14,7 @@ from jaxtyping import Array, Float
 
 from ..recording import Recording
 from ..units import FORCE, POSITION, TIME, VELOCITY
-from .base import AbstractLaw, AbstractTerm, Parameter, Sample
-from .table import reading
+from .base import AbstractTerm, Parameter
 
 UNKNOWN = float("nan")
 
@@ -141,19 +140,30 @@ class LuGre(AbstractMemory):
         return jnp.stack([lagging, bump * lagging], axis=1)
 
 
-class FrictionalLag(AbstractLaw):
-    """Friction that follows velocity late: F(v(t − τ)) = F − τ dF/dt + O(τ²): first order.
+def _memory_bounds(scales):
+    """From one sample to a fiftieth of the record: what lasts longer is no transient."""
+    return scales.interval, 0.02 * scales.duration
 
-    F is the channel `predicted_friction`, what the model says friction is. Its constant part has
-    no rate and its viscous part is τ F_v off the inertia, so the Stribeck curve alone shows τ
-    (Hess & Soom 1990: a few to tens of milliseconds).
+
+class FrictionalLag(AbstractMemory):
+    """Friction that follows speed late: F = T sign(v) (abs f(t − τ) − abs f(t))/τ.
+
+    f is the channel `predicted_friction`, what the model says friction is, N. All of it τ late is
+    T = τ (Hess & Soom 1990: a few to tens of milliseconds); to first order only T shows, which is
+    why it is the parameter. `frictional_lag` T, s; `friction_memory` τ, s. Its constant part has
+    no rate and its viscous part is T F_v off the inertia, so the Stribeck curve alone shows it.
     """
 
+    friction_memory: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("frictional_lag", TIME),)
-    coordinates: ClassVar = frozenset({"predicted_friction"})
+    nonlinear: ClassVar = (Parameter("friction_memory", TIME, _memory_bounds),)
+    coordinates: ClassVar = frozenset({"time", "velocity", "predicted_friction"})
 
-    def law(self, sample: Sample):
-        return (jnp.zeros_like(sample.time),)
-
-    def impulse(self, sample: Sample):
-        return (-reading(sample, "predicted_friction"),)
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        begins, direction = starts(recording), jnp.sign(recording.velocity)
+        level = direction * recording.channels["predicted_friction"]
+        steps = jnp.pad(jnp.diff(recording.time), (1, 0))
+        elapsed = jnp.cumsum(jnp.where(begins, 0.0, jnp.maximum(steps, 0.0)))
+        begin = jax.lax.cummax(jnp.where(begins, elapsed, 0.0))
+        late = jnp.interp(jnp.maximum(elapsed - self.friction_memory, begin), elapsed, level)
+        return (direction * (late - level) / self.friction_memory)[:, None]

@@ -7,10 +7,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..recording import Recording
-from ..units import FORCE, POSITION, Dimension
-from .base import AbstractLaw, Parameter, Sample
+from ..units import DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
+from .base import Parameter
 from .presliding import AbstractMemory, starts
-from .table import reading
 
 UNKNOWN = float("nan")
 
@@ -59,19 +58,65 @@ class Backlash(AbstractMemory):
         return (-jnp.sign(recording.velocity) * inside)[:, None]
 
 
-class Compliance(AbstractLaw):
-    """Load M_L behind a spring k, position on the motor: u = f − (M_L²/k) d²a/dt²: first order.
+def _resonance_bounds(scales):
+    """From four periods in the record to four samples a period."""
+    return 4.0 / scales.duration, 0.25 / scales.interval
 
-    x_L = x − (M_L/k) ẍ_L, so that u = M ẍ + M_L ẍ_L = (M + M_L) a − (M_L²/k) ä + …, valid well
-    below the resonance; ringing at it takes a second mass. Needs the jerk ȧ of the motion as the
-    channel `predicted_jerk`; the last derivative sits on the kernel.
+
+def _damping_bounds(scales):
+    """From a bare steel shaft to what no longer overshoots much."""
+    return 0.01, 0.7
+
+
+class Compliance(AbstractMemory):
+    """Load on a spring and a damper, position on the motor: u = f + M_L (a_L − a).
+
+    With r = x_L − x: r̈ + 2ζω ṙ + ω² r = −a, and M_L (a_L − a) = d(M_L ṙ)/dt. `load_inertia` M_L,
+    kg; `load_resonance` ω/2π, Hz, at which the load swings against a held motor;
+    `damping_ratio` ζ. The oscillator is exact for a velocity that is straight between the samples;
+    friction acts on the motor. A segment starts with the load at rest on its spring.
     """
 
-    affine: ClassVar = (Parameter("compliance", Dimension(force=1, position=-1, time=4)),)
-    coordinates: ClassVar = frozenset({"predicted_jerk"})
+    load_resonance: Float[Array, ""] | float = UNKNOWN
+    damping_ratio: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("load_inertia", INERTIA),)
+    nonlinear: ClassVar = (
+        Parameter("load_resonance", FREQUENCY, _resonance_bounds),
+        Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds),
+    )
 
-    def law(self, sample: Sample):
-        return (jnp.zeros_like(sample.time),)
+    @property
+    def inertial(self) -> bool:
+        return True
 
-    def impulse(self, sample: Sample):
-        return (-reading(sample, "predicted_jerk"),)
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        return jnp.zeros((recording.num_samples, 1), recording.time.dtype)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        begins = starts(recording)
+        span = jnp.pad(jnp.diff(recording.time), (1, 0))
+        pull = jnp.pad(jnp.diff(recording.velocity), (1, 0))
+        real = ~begins & (span > 0)
+        span = jnp.where(real, span, 1.0)
+        pull = jnp.where(real, pull / span, 0.0)
+        omega = 2 * jnp.pi * self.load_resonance
+        decay = self.damping_ratio * omega
+        swing = omega * jnp.sqrt(1 - self.damping_ratio**2)
+        fading = jnp.exp(-decay * span)
+        cosine = fading * jnp.cos(swing * span)
+        sine = fading * jnp.sin(swing * span) / swing
+        sunk = pull / omega**2
+
+        def step(state, now):
+            stretch, rate = state
+            cosine, sine, sunk, begin = now
+            # Free vibration about where the acceleration would hold the spring.
+            away = stretch + sunk
+            stretch = away * (cosine + decay * sine) + rate * sine - sunk
+            rate = rate * (cosine - decay * sine) - away * omega**2 * sine
+            state = jnp.where(begin, 0.0, stretch), jnp.where(begin, 0.0, rate)
+            return state, state[1]
+
+        rest = jnp.zeros_like(recording.velocity[0])
+        along = (cosine, sine, sunk, ~real)
+        return jax.lax.scan(step, (rest, rest), along, unroll=4)[1][:, None]

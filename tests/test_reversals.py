@@ -1,0 +1,95 @@
+"""Sticking at a reversal, or yielding: told from the displacement, in any unit."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import Recording, explain
+from jaxfric.explanation import evidence, question, regression, reversals
+from jaxfric.models import named
+
+COUNT, RATE = 24000, 1000.0
+TIME = np.arange(COUNT) / RATE
+LEVEL, DISTANCE, PITCH = 20.0, 8e-6, 1e-6
+
+
+def path(creep):
+    """Strokes of about 0.1 m, with a pause of 50 ms after each in which the axis turns by `creep`.
+
+    Position, direction of the stroke, and how much of the pause is over.
+    """
+    swing, pause = 0.75, 0.05
+    leg = np.floor(TIME / (swing + pause)).astype(int)
+    inside = TIME - leg * (swing + pause)
+    share = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / swing, 1.0))
+    waited = np.clip((inside - swing) / pause, 0, 1)
+    way = np.where(leg % 2 == 0, 1.0, -1.0)
+    ends = np.where(np.arange(leg[-1] + 3) % 2 == 0, 0.0, 0.1)
+    ends = ends + 0.03 * np.sin(2.3 * np.arange(len(ends)) ** 1.3)
+    start, end = ends[leg] + way * creep, ends[leg + 1]
+    return start + (end - start) * share - way * creep * waited, way, waited
+
+
+def recorded(x, friction, seed=0, force_unit=1.0, unit=1.0):
+    """Counts of an encoder, a mass of 2 kg, and a noise of 0.1 N."""
+    speed = np.gradient(x, TIME)
+    acceleration = np.gradient(np.convolve(speed, np.ones(9) / 9, "same"), TIME)
+    noise = 0.1 * np.random.default_rng(seed).standard_normal(COUNT)
+    force = 2.0 * acceleration + friction + 50.0 * speed + noise
+    counts = PITCH * np.round(x / PITCH)
+    return Recording(TIME, force_unit * force, unit * counts)
+
+
+def yielding(**options):
+    """Dahl's friction along strokes that turn back softly."""
+    x, _, _ = path(6 * DISTANCE)
+    z = np.ones(COUNT)
+    for i, step in enumerate(np.diff(x), 1):
+        keep = np.exp(-abs(step) / DISTANCE)
+        z[i] = keep * z[i - 1] + (1 - keep) * np.sign(step)
+    return recorded(x, LEVEL * z, **options)
+
+
+def sticking(**options):
+    """Coulomb friction: at rest the force passes from one level to the other."""
+    x, direction, waited = path(0.0)
+    return recorded(x, LEVEL * direction * (1 - 2 * waited), **options)
+
+
+def yields(recording, seen=None):
+    seen = seen or evidence.gather(question.from_position(recording))
+    base = regression.fit([named("symmetric-coulomb-viscous")], seen)
+    return reversals.yields(recording, seen, base)
+
+
+@pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])
+def test_an_axis_that_yields_is_told_from_one_that_sticks(force_unit, unit):
+    for seed in range(3):
+        assert yields(yielding(seed=seed, force_unit=force_unit, unit=unit))
+        assert not yields(sticking(seed=seed, force_unit=force_unit, unit=unit))
+
+
+def test_the_mirror_of_a_recording_says_the_same():
+    for recording in (yielding(), sticking()):
+        mirrored = dataclasses.replace(
+            recording, position=-recording.position, force=-recording.force
+        )
+        assert yields(mirrored) == yields(recording)
+
+
+def test_without_a_position_nothing_is_said():
+    recording = yielding()
+    seen = evidence.gather(question.from_position(recording))
+    speed = jnp.gradient(recording.position, recording.time)
+    bare = dataclasses.replace(recording, position=None, velocity=speed)
+    assert yields(recording, seen) and not yields(bare, seen)
+
+
+def test_presliding_of_a_few_counts_is_named_with_its_distance():
+    found = explain(yielding(), "symmetric-coulomb-viscous", yielding(seed=1))
+    assert found.findings[0].effect == "presliding"
+    parameters = found.findings[0].parameters
+    assert abs(float(parameters["presliding_distance"].value) - DISTANCE) < 0.35 * DISTANCE
+    assert abs(float(parameters["presliding_force"].value) - LEVEL) < 0.15 * LEVEL
