@@ -40,7 +40,7 @@ def run(arguments: Namespace) -> int:
     progress.end()
     if jax.process_index():
         return 0
-    _check_any(files, rows)
+    _check_any(files, rows, kept)
     fleet.write(arguments.out, tables.columns(files, rows, arguments.model))
     found = fleet.compare(files, rows)
     if arguments.plot:
@@ -86,10 +86,11 @@ def _devices(arguments: Namespace) -> None:
             raise ValueError(f"--process: the others are not reached: {error}") from error
 
 
-def _check_any(files: Sequence[fleet.File], rows) -> None:
-    """Where every file fails alike, what was asked for is wrong."""
+def _check_any(files: Sequence[fleet.File], rows, kept: journal.Journal) -> None:
+    """Where every file fails, what was asked for is wrong."""
     failed = [file for file in files if rows[file.path]["result"] == "failed"]
     if len(failed) == len(files):
+        kept.remove()
         raise ValueError(f"none of {len(files)} files: {rows[failed[0].path]['reason']}")
 
 
