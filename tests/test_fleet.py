@@ -98,8 +98,10 @@ def test_a_row_is_what_identify_says_of_the_file(tmp_path, capsys):
     write_log(folder / "short.npz", count=790)
     whole = io.read(folder / "long.npz")
     # One way only, ever faster: closed windows would use less than half of it.
-    speed = 0.01 + 0.2 * np.asarray(whole.time)
-    io.write_table(folder / "open.npz", {"t": whole.time, "v": speed, "f": 10.0 + 0.4 + 40 * speed})
+    time = np.asarray(whole.time)
+    speed = 0.01 + 0.2 * time**2
+    force = 10.0 + 0.8 * time + 40 * speed + 0.1 * np.random.default_rng(0).normal(size=time.size)
+    io.write_table(folder / "open.npz", {"t": time, "v": speed, "f": force})
     out, single = tmp_path / "fits.csv", tmp_path / "single.json"
     assert run(folder, "--out", out) == 0
     rows = rows_of(out)

@@ -68,7 +68,7 @@ def _parameter(axes, name: str, files: Sequence[File], rows: Mapping[str, Row], 
             half = None if bars is None else bars[chosen]
             style = {"fmt": "o", "ms": size, "lw": 0.8, "color": colour, "zorder": 3}
             axes.errorbar(place[chosen], values[chosen], half, **style)
-    _label(axes, [files[i] for i in np.flatnonzero(outside)], place[outside], values[outside])
+    _label(axes, [file for file in files if file.path in out], place[outside], values[outside])
     if usual and usual[0].ratio and np.all(values > 0):
         axes.set_yscale("log")
     else:
