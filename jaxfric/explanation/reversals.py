@@ -6,6 +6,8 @@ Under presliding it moves with that force, and then such a row is the best witne
 displacement decides, which needs neither a model of the encoder nor one of the controller.
 """
 
+from collections.abc import Iterator
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -33,7 +35,10 @@ def yields(recording: Recording, evidence: Evidence, base: Fit) -> bool:
     """
     if recording.position is None:
         return False
-    slopes = _slopes(recording, evidence, base)
+    position = np.asarray(recording.position)
+    slopes = np.array(
+        [_slope(level, position[at]) for at, level in passages(recording, evidence, base)]
+    )
     if not len(slopes):
         return False
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(DRAWS, len(slopes)))
@@ -41,31 +46,36 @@ def yields(recording: Recording, evidence: Evidence, base: Fit) -> bool:
     return bool((1 + larger) / (1 + DRAWS) <= LEVEL)
 
 
-def _slopes(recording: Recording, evidence: Evidence, base: Fit) -> np.ndarray:
-    """Slope of position by friction force in each reversal, in parts of the force, m."""
-    count, slowest = recording.num_samples, evidence.limits.slowest
+def passages(
+    recording: Recording, evidence: Evidence, base: Fit
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Samples of each reversal in which friction passes from one level to the other, and its
+    force there in parts of the level, from −1 to 1.
+    """
+    count, width = recording.num_samples, evidence.width
     prepared = lengthened(recording)
-    velocity = np.asarray(prepared.velocity)[:count]
+    velocity, segment = np.asarray(prepared.velocity)[:count], np.asarray(recording.segment)
     position, force = np.asarray(recording.position), np.asarray(recording.force)
-    segment = np.asarray(recording.segment)
     forward, backward = _levels(base, evidence)
     level = (2 * force - forward - backward) / max(forward - backward, 1e-300)
-    slips = np.flatnonzero((np.abs(velocity) > slowest) & np.asarray(recording.mask))
+    fast = np.abs(velocity) > evidence.limits.slowest
+    slips = np.flatnonzero(fast & np.asarray(recording.mask))
     turns = np.sign(velocity[slips[1:]]) != np.sign(velocity[slips[:-1]])
     turns &= segment[slips[1:]] == segment[slips[:-1]]
     before, after = slips[:-1][turns], slips[1:][turns]
     edges = np.array([0, *((before + after) // 2), count])
-    found = []
     for number, (stop, go) in enumerate(zip(before, after, strict=True)):
         # The velocity is smoothed over a kernel at most; half the way to the next turn at most.
         middles = (edges[number : number + 2] + edges[number + 1 : number + 3]) // 2
-        first, last = max(stop - evidence.width, middles[0]), min(go + evidence.width, middles[1])
+        first, last = max(stop - width, middles[0]), min(go + width, middles[1])
         at = first + _between(level[first:last], np.sign(velocity[stop]) * position[first:last])
-        if len(at) < LEAST_SAMPLES or np.ptp(level[at]) < 0.5 * BETWEEN:
-            continue
-        by = level[at] - np.mean(level[at])
-        found.append(by @ position[at] / (by @ by))
-    return np.array(found)
+        if len(at) >= LEAST_SAMPLES and np.ptp(level[at]) >= 0.5 * BETWEEN:
+            yield at, level[at]
+
+
+def _slope(by: np.ndarray, values: np.ndarray) -> float:
+    by = by - np.mean(by)
+    return float(by @ values / (by @ by))
 
 
 def _between(level: np.ndarray, way: np.ndarray) -> np.ndarray:

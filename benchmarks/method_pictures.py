@@ -1,0 +1,92 @@
+"""The pictures of jaxfric/explanation/METHOD.md: `python benchmarks/method_pictures.py`."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+from pathlib import Path
+
+import jax
+import matplotlib.pyplot as plt
+import numpy as np
+
+from jaxfric import concealed
+from jaxfric.cli.demo import EFFECT, SEED, SIZE
+from jaxfric.explanation import candidates, chance, evidence, question, regression, reversals
+from jaxfric.explanation.predictions import with_predictions
+from jaxfric.models import named
+
+FOLDER = Path(__file__).parents[1] / "jaxfric" / "explanation" / "pictures"
+
+
+def save(figure, name):
+    """Write a picture, the same for the same numbers."""
+    FOLDER.mkdir(exist_ok=True)
+    figure.savefig(FOLDER / f"{name}.svg", metadata={"Date": None}, bbox_inches="tight")
+
+
+def rows(asked, machine):
+    """What the base leaves, against position, and the force that was concealed."""
+    seen, truth = asked.evidence, machine.truth[EFFECT]
+    x = np.asarray(seen.motion.position)[seen.centre]
+    kept = np.abs(x - np.median(x)) < 1.5 * truth["pitch"]
+    figure, axis = plt.subplots(figsize=(6.4, 2.6))
+    some = np.flatnonzero(kept)[::2]
+    axis.plot(1e3 * x[some], asked.base.residual[some], ".", ms=2, label="rows in slip")
+    axis.set(xlabel="position, mm", ylabel="residual of the base, N")
+    axis.legend(frameon=False, loc="upper right")
+    save(figure, "rows")
+
+
+def draws(asked):
+    """The best of all candidates by chance, and the gain of the winner."""
+    seen = with_predictions(asked.evidence, asked.base)
+    field = candidates.Field(seen, asked.structure)
+    judge = chance.Judge(asked.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
+    scans = [
+        judge(field.columns(i, seen), candidate.effect.positive)
+        for i, candidate in enumerate(field.candidates)
+    ]
+    names = [candidate.effect.name for candidate in field.candidates]
+    winner = int(np.argmax([scan.gain[scan.best] for scan in scans]))
+    figure, axis = plt.subplots(figsize=(6.4, 2.6))
+    edges = np.geomspace(1e-4, 1, 60)
+    axis.hist(scans[winner].drawn, edges, label=f"{names[winner]}, signs of blocks flipped")
+    axis.axvline(scans[winner].gain[scans[winner].best], color="C3", label="as recorded")
+    axis.set(xscale="log", xlabel="part of the residual explained", ylabel="draws")
+    axis.legend(frameon=False)
+    save(figure, "chance")
+
+
+def turns():
+    """Position by friction force in each reversal, where the axis yields and where it sticks."""
+    figure, axes = plt.subplots(1, 2, figsize=(6.4, 2.6), sharey=True)
+    for axis, effects, title in zip(
+        axes, (("presliding",), ()), ("yields: presliding", "sticks"), strict=True
+    ):
+        machine = concealed.draw(100, effects, 0.15)
+        motion = question.from_position(concealed.record(machine).recording)
+        seen = evidence.gather(motion)
+        base = regression.fit([named(machine.baseline)], seen)
+        for at, level in reversals.passages(motion, seen, base):
+            way = np.asarray(motion.position)[at]
+            axis.plot(level, 1e6 * (way - way.mean()), lw=0.7)
+        axis.set(title=title, xlabel="force, parts of the friction level")
+    axes[0].set_ylabel("position, µm")
+    save(figure, "reversals")
+
+
+def main():
+    """All pictures."""
+    plt.switch_backend("svg")
+    plt.rcParams |= {"svg.fonttype": "none", "font.size": 9, "svg.hashsalt": "jaxfric"}
+    machine = concealed.draw(SEED, (EFFECT,), SIZE)
+    asked = question.ask(concealed.record(machine).recording, None, named(machine.baseline))
+    rows(asked, machine)
+    draws(asked)
+    turns()
+
+
+if __name__ == "__main__":
+    jax.config.update("jax_enable_x64", True)
+    main()
