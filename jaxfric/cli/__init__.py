@@ -156,7 +156,7 @@ def _add_identify(commands) -> None:
         metavar="NAME",
         help="a name that jaxfric models lists, or best: held-out data choose (default: gaussian)",
     )
-    _identifying(command)
+    options.identifying(command)
     command.add_argument(
         "--json", type=options.output, metavar="OUT", help="write the identification; - prints it"
     )
@@ -167,22 +167,6 @@ def _add_identify(commands) -> None:
         "--plot", type=options.picture, metavar="OUT.png", help="draw it (extra: report)"
     )
     options.reading(command)
-
-
-def _identifying(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--projection",
-        choices=("auto", "closed-windows", "weak-form"),
-        default="auto",
-        help="without mass and acceleration, or with inertia fitted too (default: auto)",
-    )
-    command.add_argument(
-        "--bounds",
-        type=options.bounds,
-        default={},
-        metavar="NAME=LOW:HIGH,…",
-        help="of nonlinear parameters, for instance stribeck_velocity+=0.001:0.1",
-    )
 
 
 def _add_explain(commands) -> None:
@@ -293,43 +277,8 @@ def _add_effects(commands) -> None:
 
 def _add_fleet(commands) -> None:
     command = _add(commands, "fleet", "fleet.run", "many recordings, streamed, resumable")
-    command.add_argument(
-        "patterns",
-        nargs="+",
-        metavar="PATTERN",
-        help="'logs/**/*.parquet' (quoted), files, or folders",
-    )
-    command.add_argument(
-        "--model", default="gaussian", metavar="NAME", help="as jaxfric models lists them"
-    )
-    command.add_argument(
-        "--out", required=True, metavar="FITS.parquet", help="one row a recording; or .csv"
-    )
-    command.add_argument(
-        "--plot", type=options.picture, metavar="OUT.png", help="draw the fleet (extra: report)"
-    )
-    command.add_argument(
-        "--axis",
-        metavar="KEY_OR_REGEX",
-        help="which axis a path is of, for drift (default: folders named key=value)",
-    )
-    command.add_argument(
-        "--group", metavar="KEY_OR_REGEX", help="outliers within groups (default: the whole fleet)"
-    )
-    _identifying(command)
-    command.add_argument(
-        "--jobs", type=options.count, metavar="K", help="cores to use (default: all)"
-    )
-    command.add_argument(
-        "--restart", action="store_true", help="forget the rows of an interrupted run"
-    )
-    command.add_argument(
-        "--process",
-        type=options.process,
-        metavar="I/N@HOST:PORT",
-        help="the I-th, from 0, of N such commands on machines that share the folders; "
-        "process 0 is reached at HOST:PORT",
-    )
+    options.gathering(command)
+    options.identifying(command)
     options.reading(command)
 
 

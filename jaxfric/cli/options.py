@@ -151,3 +151,58 @@ def reading(command: ArgumentParser) -> None:
         metavar="force=N,position=m",
         help="after scaling; they name, they do not convert",
     )
+
+
+def identifying(command: ArgumentParser) -> None:
+    """Add the options that say how to identify."""
+    command.add_argument(
+        "--projection",
+        choices=("auto", "closed-windows", "weak-form"),
+        default="auto",
+        help="without mass and acceleration, or with inertia fitted too (default: auto)",
+    )
+    command.add_argument(
+        "--bounds",
+        type=bounds,
+        default={},
+        metavar="NAME=LOW:HIGH,…",
+        help="of nonlinear parameters, for instance stribeck_velocity+=0.001:0.1",
+    )
+
+
+def gathering(command: ArgumentParser) -> None:
+    """Add the options of a fleet: which recordings, where to, on what."""
+    command.add_argument(
+        "patterns",
+        nargs="+",
+        metavar="PATTERN",
+        help="'logs/**/*.parquet' (quoted), files, or folders",
+    )
+    command.add_argument(
+        "--model", default="gaussian", metavar="NAME", help="as jaxfric models lists them"
+    )
+    command.add_argument(
+        "--out", required=True, metavar="FITS.parquet", help="one row a recording; or .csv"
+    )
+    command.add_argument(
+        "--plot", type=picture, metavar="OUT.png", help="draw the fleet (extra: report)"
+    )
+    command.add_argument(
+        "--axis",
+        metavar="KEY_OR_REGEX",
+        help="which axis a path is of, for drift (default: folders named key=value)",
+    )
+    command.add_argument(
+        "--group", metavar="KEY_OR_REGEX", help="outliers within groups (default: the whole fleet)"
+    )
+    command.add_argument("--jobs", type=count, metavar="K", help="cores to use (default: all)")
+    command.add_argument(
+        "--restart", action="store_true", help="forget the rows of an interrupted run"
+    )
+    command.add_argument(
+        "--process",
+        type=process,
+        metavar="I/N@HOST:PORT",
+        help="the I-th, from 0, of N such commands on machines that share the folders; "
+        "process 0 is reached at HOST:PORT",
+    )

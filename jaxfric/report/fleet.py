@@ -32,12 +32,13 @@ def render(
     fine = [file for file in files if rows[file.path]["result"] == "successful"]
     names = list(dict.fromkeys(one.name for one in found.usual if one.name != FORCE_ERROR))
     names += [FORCE_ERROR] * bool(found.usual)
-    drifts = [drift for drift in found.drifts if drift.chance < LEVEL][:DRIFTS]
+    drifts = [drift for drift in found.drifts if drift.chance < LEVEL]
+    told = f"outliers: {len(found.outliers)}, drifts: {len(drifts)}"
+    drifts = drifts[:DRIFTS]
     count = len(names) + len(drifts)
-    height = -(-len(names) // ACROSS) + -(-len(drifts) // ACROSS)
+    height = -(-count // ACROSS)
     picture = library()(figsize=(4.2 * ACROSS, 0.8 + 2.7 * max(1, height)), layout="constrained")
     whole = f"{len(files)} recordings, {len(fine)} of them successful"
-    told = f"{len(found.outliers)} outliers, {sum(d.chance < LEVEL for d in found.drifts)} drifts"
     picture.suptitle(f"{whole}; {told}")
     if count:
         panels = picture.subplots(max(1, height), ACROSS, squeeze=False)
@@ -45,8 +46,7 @@ def render(
             axes.set_visible(False)
         for axes, name in zip(panels.flat, names, strict=False):
             _parameter(axes, name, fine, rows, found)
-        first = -(-len(names) // ACROSS)
-        for axes, drift in zip(panels[first:].flat, drifts, strict=False):
+        for axes, drift in zip(panels.flat[len(names) :], drifts, strict=False):
             _drift(axes, drift)
     buffer = BytesIO()
     picture.savefig(buffer, format=format, dpi=110)
@@ -72,7 +72,8 @@ def _parameter(axes, name: str, files: Sequence[File], rows: Mapping[str, Row], 
     if usual and usual[0].ratio and np.all(values > 0):
         axes.set_yscale("log")
     else:
-        _limit(axes, values, usual)
+        edges = [one.median + side * one.deviation for one in usual for side in (-4, 4)]
+        _limit(axes, values, edges)
     unit = usual[0].unit if usual else ""
     axes.set_title(name.replace("_", " "), fontsize=10)
     axes.set_ylabel("share of the force" if name == FORCE_ERROR else unit)
@@ -114,10 +115,9 @@ def _band(axes, usual, files, place) -> None:
         axes.plot(span, [one.median] * 2, color=_LINE, lw=1.2, zorder=2)
 
 
-def _limit(axes, values, usual) -> None:
-    """Room for the values and the band; a single far bar must not press all others flat."""
-    ends = [v for v in values if np.isfinite(v)]
-    ends += [one.median + s * 4 * one.deviation for one in usual for s in (-1, 1)]
+def _limit(axes, values, others) -> None:
+    """Room for the values and others; a single far bar must not press all of them flat."""
+    ends = [v for v in (*values, *others) if np.isfinite(v)]
     if ends and max(ends) > min(ends):
         margin = 0.08 * (max(ends) - min(ends))
         axes.set_ylim(min(ends) - margin, max(ends) + margin)
@@ -131,6 +131,8 @@ def _drift(axes, drift: Drift) -> None:
     ends = np.array([drift.places[0], drift.places[-1]])
     level, rise = drift.line
     axes.plot(ends, level + rise * ends, color=_OUT, lw=1.5)
+    # Errors larger than the scatter are common to the recordings: the course shows all the same.
+    _limit(axes, drift.values, level + rise * ends)
     axes.set_title(f"{drift.axis}: {drift.name.replace('_', ' ')}", fontsize=10)
     axes.set_xlabel("days" if drift.per == "day" else "recording of the axis", fontsize=8)
     axes.set_ylabel("share of the force" if drift.name == FORCE_ERROR else drift.unit)
