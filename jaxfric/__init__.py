@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import (
+        devices as devices,
         export as export,
+        fleet as fleet,
         models as models,
         scenario as scenario,
         signals as signals,
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
     from .simulation import simulate as simulate
     from .uncertainty import Estimate as Estimate
 
-_MODULES = ("export", "models", "scenario", "signals", "terms")
+_MODULES = ("devices", "export", "fleet", "models", "scenario", "signals", "terms")
 _NAMES = {
     "control": ("PD", "PID", "Cascade", "Encoder"),
     "explanation": ("Explanation", "explain"),

@@ -105,7 +105,7 @@ def test_public_names_stay_what_they_are_whatever_was_imported_before():
         "import importlib, pkgutil, types, jaxfric\n"
         "for m in pkgutil.walk_packages(jaxfric.__path__, 'jaxfric.'):\n"
         "    if m.name.split('.')[1] != '__main__': importlib.import_module(m.name)\n"
-        "modules = ('export', 'models', 'scenario', 'signals', 'terms')\n"
+        "modules = ('devices', 'export', 'fleet', 'models', 'scenario', 'signals', 'terms')\n"
         "hidden = [n for n in jaxfric.__all__ if n not in modules\n"
         "          and isinstance(getattr(jaxfric, n), types.ModuleType)]\n"
         "assert not hidden, hidden\n"
