@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
-from jaxfric.explanation import explain
+from jaxfric.explanation import candidates, evidence, explain, pulses
 
 TIME = np.arange(16384) / 1000.0
 COULOMB = 20.0
@@ -181,3 +181,32 @@ def test_too_short_a_recording_says_so(healthy):
     short = jax.tree.map(lambda x: x[:300], healthy[0])
     with pytest.raises(ValueError, match=r"slip|structure"):
         explain(short, "gaussian")
+
+
+def test_a_late_force_is_a_delay_and_nothing_else(healthy):
+    run, held = (dataclasses.replace(r, force=jnp.roll(r.force, -6)) for r in healthy)
+    run, held = (jax.tree.map(lambda x: x[:-8], r) for r in (run, held))
+    found = explain(run, "gaussian", held)
+    assert [f.effect for f in found.findings] == ["transport_delay"]
+    delay = found.findings[0].parameters["delay"]
+    # The force was aligned within a sample before.
+    assert float(delay.value) == pytest.approx(6e-3, abs=1.1e-3)
+
+
+def test_what_the_motion_has_is_no_tone(healthy):
+    seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
+    tones = candidates.line_frequencies(seen, "time")
+    kept = candidates._foreign(tones, seen)
+    rates = 0.7 * (1 + np.random.default_rng(0).uniform(0, 2.5, 5))
+    for rate in rates:
+        assert np.min(np.abs(kept - rate)) > 0.25 * (tones[1] - tones[0])
+    assert len(kept) > 0.8 * len(tones)
+
+
+def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
+    seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
+    clock, speed = np.asarray(seen.motion.time), np.asarray(seen.motion.velocity)
+    turns = clock[: seen.nodes - 1][np.diff(np.sign(speed[: seen.nodes])) != 0]
+    assert pulses._at_reversals(seen, turns[2:12:2].tolist(), 0.01)
+    between = 0.5 * (turns[1:] + turns[:-1])[np.argsort(-np.diff(turns))[:5]]
+    assert not pulses._at_reversals(seen, between.tolist(), 0.01)

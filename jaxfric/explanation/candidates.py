@@ -144,8 +144,9 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
             periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
         yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))
     elif kind is laws.PeriodicDisturbance:
-        tones = line_frequencies(evidence, "time")
-        yield Candidate(effect, term, tones[:, None], Lines("time", False))
+        tones = _foreign(line_frequencies(evidence, "time"), evidence)
+        if len(tones):
+            yield Candidate(effect, term, tones[:, None], Lines("time", False))
     elif kind is laws.StickySpot:
         yield Candidate(effect, term, _spots(evidence))
     elif kind is laws.Compliance:
@@ -168,6 +169,30 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     fine = 8 * GRID if isinstance(term, laws.FrictionStep) else GRID
     along = (np.arange(fine) + 0.5) / fine
     return space.beta(np.repeat(along[:, None], count, axis=1))
+
+
+# Part of the motion's variance in a tone's resolution cell from which the tone is the motion's own:
+# an unrelated one holds two of some thousand values.
+OWN = 0.05
+
+
+def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
+    """The tones that the motion does not have: what repeats with it need not be driven by time."""
+    motion, rows = evidence.motion, evidence.centre
+    time, velocity = np.asarray(motion.time)[rows], np.asarray(motion.velocity)[rows]
+    series = [velocity, np.abs(velocity), evidence.side]
+    if motion.position is not None:
+        series.append(np.asarray(motion.position)[rows])
+    series = np.stack([s - s.mean() for s in series])
+    series /= np.maximum(np.linalg.norm(series, axis=1), 1e-300)[:, None]
+    free = np.empty(len(tones), bool)
+    for i, tone in enumerate(tones):
+        angle = 2 * np.pi * tone * (time - time[0])
+        wave = np.stack([np.sin(angle), np.cos(angle)])
+        wave -= wave.mean(axis=1, keepdims=True)
+        power = np.sum((series @ wave.T) ** 2, axis=1) * 2 / len(time)
+        free[i] = np.max(power) < OWN
+    return tones[free]
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
