@@ -180,10 +180,10 @@ def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
     """The tones that the motion does not have: what repeats with it need not be driven by time."""
     motion, rows = evidence.motion, evidence.centre
     time, velocity = np.asarray(motion.time)[rows], np.asarray(motion.velocity)[rows]
-    series = [velocity, np.abs(velocity), evidence.side]
+    signals = [velocity, np.abs(velocity), evidence.side]
     if motion.position is not None:
-        series.append(np.asarray(motion.position)[rows])
-    series = np.stack([s - s.mean() for s in series])
+        signals.append(np.asarray(motion.position)[rows])
+    series = np.stack([signal - signal.mean() for signal in signals])
     series /= np.maximum(np.linalg.norm(series, axis=1), 1e-300)[:, None]
     free = np.empty(len(tones), bool)
     for i, tone in enumerate(tones):

@@ -126,11 +126,11 @@ def _verified(found: Named, asked: Question, structure, seed) -> Named:
             continue
         less = verification.without(found, evidence, number)
         place = len(found.last.terms) - len(found.taken) + number
-        if verification.share(less, found.last, found.base, asked.held, found.rephased) > 0:
+        if verification.helps(less, found.last, asked.held, found.rephased):
             continue
         again = found.rephased | {place}
         if verification.wavelike(found.last, place) and (
-            verification.share(less, found.last, found.base, asked.held, again) > 0
+            verification.helps(less, found.last, asked.held, again)
         ):
             taken = [
                 t._replace(rephased=t.rephased or i == number) for i, t in enumerate(found.taken)

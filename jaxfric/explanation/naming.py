@@ -289,8 +289,9 @@ LINEARITY = 2e-3
 # What comes after stronger terms must also be this part of what the base left: the first order of
 # a strong effect leaves a second order, which is no effect of its own.
 OF_BASE = 0.01
-# Isolated pushes besides another effect are mostly where that effect switches.
-PUSHES_OF_BASE = 0.05
+# Isolated pushes besides another effect are mostly where that effect switches, and sharp terms take
+# what a strong effect leaves through the kernel.
+EASY_OF_BASE = 0.05
 
 
 def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit | None):
@@ -300,8 +301,9 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit | None):
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
         if base is not None:
-            pushes = isinstance(finalist.trial.candidate.term, DisturbancePulses)
-            enough &= gained >= (PUSHES_OF_BASE if pushes else OF_BASE) * base.energy
+            name = finalist.trial.candidate.effect.name
+            easy = name in SHARP or name == "disturbance_pulses"
+            enough &= gained >= (EASY_OF_BASE if easy else OF_BASE) * base.energy
             again = finalist.trial.candidate.lines is None and any(
                 isinstance(finalist.trial.candidate.term, type(term)) for term in now.terms[1:]
             )

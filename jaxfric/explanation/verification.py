@@ -2,23 +2,38 @@
 
 import numpy as np
 
+from .. import terms as laws
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Contest, Named
 from .predictions import with_predictions
 from .regression import Fit, fit
 
+# What belongs to a moment of one recording says nothing about another.
+_MOMENTARY = (
+    laws.FrictionStep, laws.LoadDrift, laws.ThermalDrift, laws.DisturbancePulses,
+    laws.PeriodicDisturbance,
+)  # fmt: skip
 
-def residual(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> np.ndarray:
-    """What a fit leaves of another recording with nothing refitted, N, `(J,)`.
 
-    `rephased`: numbers of terms whose waves keep their amplitude but find their phase anew: the
-    zero of an incremental encoder is another after each homing.
+def residual(
+    now: Fit,
+    evidence: Evidence,
+    rephased: frozenset[int] = frozenset(),
+    skipped: frozenset[int] = frozenset(),
+) -> np.ndarray:
+    """What a fit leaves of a recording with nothing refitted, N, `(J,)`.
+
+    `skipped`: numbers of terms that are left out; `rephased`: numbers of terms whose waves keep
+    their amplitude but find their phase anew: the zero of an incremental encoder is another after
+    each homing.
     """
     seen = with_predictions(evidence, now)
     left, waves = evidence.target.copy(), []
     for number, (term, beta, alpha) in enumerate(
         zip(now.terms, now.betas, now.alphas, strict=True)
     ):
+        if number in skipped:
+            continue
         columns = seen.columns(term, beta[None])[0]
         if number in rephased:
             waves.append((columns, alpha))
@@ -40,9 +55,16 @@ def wavelike(now: Fit, number: int) -> bool:
 
 
 def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
-    """norm(force − predicted)/norm(force) over the rows, nothing refitted."""
-    left = residual(now, evidence, rephased)
-    return float(np.sqrt(left @ left / max(evidence.target @ evidence.target, 1e-300)))
+    """norm(force − predicted)/norm(force) over the rows, nothing refitted.
+
+    Found terms that time alone drives count where they return, and not where they do not.
+    """
+    moments = [i for i, t in enumerate(now.terms) if i and isinstance(t, _MOMENTARY)]
+    lefts = [residual(now, evidence, rephased)]
+    if moments:
+        lefts.append(residual(now, evidence, rephased, frozenset(moments)))
+    power = min(float(left @ left) for left in lefts)
+    return float(np.sqrt(power / max(evidence.target @ evidence.target, 1e-300)))
 
 
 def without(named: Named, evidence: Evidence, number: int) -> Fit:
@@ -56,15 +78,42 @@ def without(named: Named, evidence: Evidence, number: int) -> Fit:
 def share(
     less: Fit, more: Fit, base: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
 ) -> float:
-    """Part of the base's mean-square residual on a recording that `more` removes beyond `less`."""
+    """Part of the base's mean-square residual elsewhere that `more` removes beyond `less`."""
+    left, right = _both(less, more, evidence, rephased)
+    power = float(np.sum(residual(base, evidence) ** 2))
+    return float(np.sum(left**2) - np.sum(right**2)) / power
+
+
+def helps(less: Fit, more: Fit, evidence: Evidence, rephased: frozenset[int]) -> bool:
+    """Whether `more` is nearer to another recording than `less`.
+
+    Both residuals are cut off at four of their standard deviations, by the median: isolated events
+    of that recording are not what a term is judged by.
+    """
+    left, right = _both(less, more, evidence, rephased)
+    limit = 4 * np.median(np.abs(right)) / 0.6745
+    left, right = (np.minimum(np.abs(r), limit) for r in (left, right))
+    return bool(np.sum(left**2) > np.sum(right**2))
+
+
+def _both(less: Fit, more: Fit, evidence: Evidence, rephased) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of both; terms of a moment are left out, but for what tells the two apart."""
     others = frozenset(
         next(i for i, term in enumerate(less.terms) if term is more.terms[n])
         for n in rephased
         if any(term is more.terms[n] for term in less.terms)
     )
-    ours = float(np.sum(residual(more, evidence, rephased) ** 2))
-    theirs = float(np.sum(residual(less, evidence, others) ** 2))
-    return (theirs - ours) / float(np.sum(residual(base, evidence) ** 2))
+    shared = {id(t) for t in less.terms[1:] if any(t is m for m in more.terms)}
+    idle = [
+        frozenset(
+            i for i, t in enumerate(now.terms) if id(t) in shared and isinstance(t, _MOMENTARY)
+        )
+        for now in (less, more)
+    ]
+    return (
+        residual(less, evidence, others, idle[0]),
+        residual(more, evidence, rephased, idle[1]),
+    )
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:
