@@ -55,7 +55,7 @@ def test_what_differs_in_the_number_of_harmonics_is_told_once(capsys):
 
 
 def test_first_order_is_said(capsys):
-    assert "first order" in printed(capsys, "compliance")
+    assert "first order" in printed(capsys, "backlash")
 
 
 @pytest.mark.parametrize("name", EFFECTS)
