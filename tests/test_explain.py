@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
-from jaxfric.explanation import candidates, evidence, explain, pulses
+from jaxfric.explanation import candidates, evidence, explain, naming, pulses, question
 
 TIME = np.arange(16384) / 1000.0
 COULOMB = 20.0
@@ -183,6 +183,7 @@ def test_too_short_a_recording_says_so(healthy):
         explain(short, "gaussian")
 
 
+@pytest.mark.slow
 def test_a_late_force_is_a_delay_and_nothing_else(healthy):
     run, held = (dataclasses.replace(r, force=jnp.roll(r.force, -6)) for r in healthy)
     run, held = (jax.tree.map(lambda x: x[:-8], r) for r in (run, held))
@@ -210,3 +211,12 @@ def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
     assert pulses._at_reversals(seen, turns[2:12:2].tolist(), 0.01)
     between = 0.5 * (turns[1:] + turns[:-1])[np.argsort(-np.diff(turns))[:5]]
     assert not pulses._at_reversals(seen, between.tolist(), 0.01)
+
+
+def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, monkeypatch):
+    term, alpha, beta = CASES["cogging"]
+    run = planted(healthy[0], term, alpha, beta)
+    asked = question.ask(run, None, models.named("gaussian"))
+    monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (asked.base, []))
+    found = naming.search(asked.evidence, asked.base, asked.structure)
+    assert found.taken == []

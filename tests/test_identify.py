@@ -172,6 +172,7 @@ def test_a_term_of_the_users_own_is_identified_in_closed_windows():
     np.testing.assert_allclose(found.parameters["drag"].value, 25.0, rtol=1e-2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["coulomb-viscous", pytest.param("gaussian", marks=pytest.mark.slow)]
 )

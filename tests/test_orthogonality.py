@@ -4,6 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 import jaxfric as jf
@@ -40,6 +41,7 @@ def test_adding_acceleration_changes_no_friction_parameter(mass):
     np.testing.assert_allclose(inertia, MASS + mass, rtol=0, atol=1e-3 * (1 + abs(mass)))
 
 
+@pytest.mark.slow
 def test_the_error_of_orthogonality_falls_with_the_square_of_the_interval():
     errors = []
     for rate in (500.0, 1000.0, 2000.0, 4000.0):

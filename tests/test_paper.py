@@ -103,6 +103,7 @@ def test_alm_error_shrinks_with_the_length_of_the_record(period):
     assert ratio < 0.5  # 1/√8 = 0.35 expected
 
 
+@pytest.mark.slow
 def test_agm_is_close_and_acvm_wrong_only_at_low_velocity(period):
     alm, agm, acvm = (identify(n, period) for n in ("lorentzian", "gaussian", "coulomb-viscous"))
     whole = [curve_error(found, 0.002, 0.18) for found in (alm, agm, acvm)]

@@ -217,11 +217,15 @@ def search(
     taken: list[Taken] = []
     evidence = with_predictions(evidence, now)
     field = Field(evidence, structure)
+    visited: set[tuple[str, ...]] = set()
     while True:
         round_ = contest(evidence, now, field, seed)
-        best = _believed(round_, now, evidence, wide, base if taken else None)
-        if best is None or len(taken) >= MOST_TERMS:
+        best = _believed(round_, now, evidence, wide, base, taken)
+        # Two terms that make each other idle would take turns for ever.
+        names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
+        if best is None or len(taken) >= MOST_TERMS or names in visited:
             return Named(base, now, taken, round_)
+        visited.add(names)
         best, rivals = _rivals(best, round_, now, evidence)
         taken.append(Taken(best.trial, rivals, best.p_value))
         terms = (*now.terms, best.trial.candidate.term)
@@ -286,24 +290,28 @@ SHARP = frozenset({"transport_delay", "actuator_lag", "compliance", "frictional_
 LINEARITY = 2e-3
 
 
-# What comes after stronger terms must also be this part of what the base left: the first order of
-# a strong effect leaves a second order, which is no effect of its own.
-OF_BASE = 0.01
+# What comes after stronger terms must also be this part of what the base left: no term has quite
+# the shape of what it stands for, and a twentieth of its amplitude may stay; a tenth where the term
+# is but the first order of its effect.
+OF_BASE = 0.002
+OF_BASE_ROUGH = 0.01
 # Isolated pushes besides another effect are mostly where that effect switches, and sharp terms take
 # what a strong effect leaves through the kernel.
 EASY_OF_BASE = 0.05
 
 
-def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit | None):
-    least = LEAST_SHARE if base is None else LATER_SHARE
+def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[Taken]):
+    least = LATER_SHARE if taken else LEAST_SHARE
+    rough = any(t.trial.candidate.effect.first_order for t in taken)
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
-        if base is not None:
+        if taken:
             name = finalist.trial.candidate.effect.name
             easy = name in SHARP or name == "disturbance_pulses"
-            enough &= gained >= (EASY_OF_BASE if easy else OF_BASE) * base.energy
+            part = EASY_OF_BASE if easy else OF_BASE_ROUGH if rough else OF_BASE
+            enough &= gained >= part * base.energy
             again = finalist.trial.candidate.lines is None and any(
                 isinstance(finalist.trial.candidate.term, type(term)) for term in now.terms[1:]
             )
