@@ -28,6 +28,7 @@ PROJECTIONS = pytest.mark.parametrize(
 
 # 96 to 97 % were measured on 200 machines; blocks of 1/64 of the record, as short as the
 # correlation, would give 82 %.
+@pytest.mark.slow
 @PROJECTIONS
 def test_coverage_in_closed_loop_with_a_slow_load(projection):
     """The hidden load is correlated over 50 ms, the record holds 40 times twice that."""

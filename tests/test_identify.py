@@ -198,6 +198,7 @@ def test_gradients_are_those_of_finite_differences(name):
         np.testing.assert_allclose(forward, closed, rtol=1e-8, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_vmap_and_jit_agree_with_a_plain_call():
     log = recording(machine(), noise=0.1, seconds=4.0)
     forces = jnp.stack([log.force, 1.1 * log.force])

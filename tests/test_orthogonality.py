@@ -122,6 +122,7 @@ def test_the_order_of_windows_does_not_matter():
         np.testing.assert_allclose(second[key], value, rtol=1e-8, err_msg=key)
 
 
+@pytest.mark.slow
 def test_padding_does_not_matter():
     moved, mass = friction(jf.pad(BUMP, BUMP.num_samples + 777), "gaussian")
     for key, value in BUMP_REFERENCE.items():

@@ -227,6 +227,7 @@ def test_a_minimum_on_the_border_is_reported_there():
         np.testing.assert_allclose(found.beta, wanted, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_never_worse_than_the_grid_on_noise_alone():
     """Without a bump the cost is a rugged line: the worst case for a refinement."""
     for seed in range(6):
