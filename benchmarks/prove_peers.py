@@ -27,8 +27,8 @@ import numpy as np
 from jaxfric import concealed, models
 from jaxfric.cli import _configure
 from jaxfric.explanation.candidates import Field
+from jaxfric.explanation.contest import contest
 from jaxfric.explanation.evidence import NODES
-from jaxfric.explanation.naming import contest
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.question import ask
 from jaxfric.proof.counting import rate

@@ -9,9 +9,9 @@ from ..models import Model, named
 from ..recording import Recording
 from ..terms.base import AbstractTerm
 from . import parameters as spelled
-from .chance import Judge, blocks
+from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
-from .naming import LEAST_SHARE, LEVEL, Named
+from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
 from .regression import Fit
 

@@ -14,9 +14,10 @@ from ..terms.base import AbstractTerm
 from . import verification
 from .baseline import Baseline, at_values, baseline_of, mismatch, simulated
 from .candidates import OF_THE_MOMENT, Field
+from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import Named, contest, search
+from .naming import Named, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .telling import tell

@@ -9,11 +9,12 @@ from ..recording import Recording
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
+from .chance import LEVEL
 from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
 from .locate import Place, locate
-from .naming import LATER_SHARE, LEAST_SHARE, LEVEL, LINEARITY, Named
+from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fit

@@ -16,8 +16,9 @@ from .. import terms as laws
 from ..effects import EFFECTS
 from ..recording import Recording
 from .candidates import Candidate
+from .contest import RIVAL
 from .evidence import gather
-from .naming import OF_BASE, RIVAL, Named, Taken
+from .naming import OF_BASE, Named, Taken
 from .predictions import with_predictions
 from .question import Question, from_position
 from .regression import fit

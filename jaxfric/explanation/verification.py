@@ -3,8 +3,9 @@
 import numpy as np
 
 from .. import terms as laws
+from .contest import Contest
 from .evidence import Evidence
-from .naming import LEAST_SHARE, Contest, Named
+from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
 from .regression import Fit, fit
 

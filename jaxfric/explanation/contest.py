@@ -1,0 +1,168 @@
+"""One round of the contest: every candidate on the grid, the best refined with the whole model."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..terms import DisturbancePulses
+from .candidates import Candidate, Field, scaled
+from .chance import DRAWS, LEVEL, Judge, adjusted, blocks, thresholds
+from .evidence import Evidence
+from .pulses import pulses
+from .regression import Fit, fit
+
+# A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
+# 1995 call ten on twice this scale very strong).
+RIVAL = 5.0
+# Effects whose columns hold a derivative of the acceleration: what the encoder's noise makes of
+# that is the same noise that the controller answered, so that it explains force without physics.
+SHARP = frozenset({"transport_delay", "actuator_lag", "compliance", "frictional_lag"})
+# Candidates refined beyond the grid: refining gains little over neighbouring grid points.
+FINALISTS = 8
+
+
+class Trial(NamedTuple):
+    """A candidate with its place on the grid, and how it did there.
+
+    `gain`: R²; `chance`: the mean of it by chance; `dimension`: how many of its columns are new;
+    `threshold`: the R² that would have been believed; `fresh`: the part of the term's force, in
+    amplitude, that the model cannot imitate.
+    """
+
+    candidate: Candidate
+    beta: np.ndarray
+    gain: float
+    chance: float
+    dimension: int
+    p_value: float
+    threshold: float
+    fresh: float
+
+    def score(self, gain: float, size: float) -> float:
+        """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978)."""
+        price = self.dimension + len(self.beta)
+        return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
+
+
+class Finalist(NamedTuple):
+    """A candidate refined: its score and p-value, the energy left, and where.
+
+    `betas`: of the whole model, the candidate's last; `alpha`: the candidate's.
+    """
+
+    score: float
+    trial: Trial
+    p_value: float
+    energy: float
+    betas: tuple[np.ndarray, ...]
+    alpha: np.ndarray
+
+
+class Contest(NamedTuple):
+    """One round: every candidate on the grid, and the finalists refitted with the whole model.
+
+    `size`: how many independent values the residual is worth.
+    """
+
+    trials: list[Trial]
+    finalists: list[Finalist]
+    size: float
+
+
+def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contest:
+    """Let every candidate compete for the residual of a fit; `evidence` with its predictions."""
+    seen = evidence
+    block = blocks(seen.elapsed[seen.centre], seen.reach)
+    judge = Judge(now, block, seed)
+    scans = [
+        judge(field.columns(i, seen), candidate.effect.positive)
+        for i, candidate in enumerate(field.candidates)
+    ]
+    drawn = np.array([s.drawn for s in scans])
+    p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
+    least = thresholds(drawn, LEVEL)
+    trials = [
+        _trial(judge, c, field.columns(i, seen), scan, float(p), float(limit))
+        for i, (c, scan, p, limit) in enumerate(
+            zip(field.candidates, scans, p_values, least, strict=True)
+        )
+    ]
+    known = any(isinstance(term, DisturbancePulses) for term in now.terms)
+    for candidate in [] if known else pulses(seen, now):
+        raw = scaled(candidate.columns(seen))
+        # Signs of blocks say nothing about single events: what stands out has been tested.
+        trials.append(_trial(judge, candidate, raw, judge(raw), 1 / (1 + DRAWS), np.inf))
+    trials = [t for t in trials if t.dimension]
+    size = float(np.median([t.dimension / t.chance for t in trials]))
+    trials.sort(key=lambda t: -t.score(t.gain, size))
+    return Contest(trials, _finals(seen, now, trials, size), size)
+
+
+def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
+    best = scan.best
+    own = raw[best : best + 1]
+    inside = np.einsum("gkj,glj->gkl", own, judge.fresh(own)[0])
+    fresh = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
+    return Trial(
+        candidate, candidate.betas[best], float(scan.gain[best]), float(scan.chance[best]),
+        int(scan.dimension[best]), p_value, limit, float(fresh),
+    )  # fmt: skip
+
+
+def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
+    done, basis = [], now.basis()
+    bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
+    # A sharp term may not be confirmed, and must not keep the next best from being looked at.
+    blunt = [t for t in trials if t.candidate.effect.name not in SHARP]
+    leader = (blunt or trials)[0]
+    enough = 0.5 * leader.score(leader.gain, size) - RIVAL
+    for number, trial in enumerate(trials):
+        found = None
+        if number < FINALISTS and trial.score(trial.gain, size) >= enough:
+            found = _refined(seen, now, trial, basis)
+        if bent and _imitated(trial, now):
+            again = _afresh(seen, now, trial)
+            found = again if found is None or again.energy < found.energy else found
+        if found is None or not _sensible(trial, found.alpha):
+            continue
+        gain = 1 - found.energy / now.energy
+        p_value = LEVEL if gain > trial.threshold else 1.0
+        p_value = min(trial.p_value, p_value)
+        done.append(found._replace(score=trial.score(gain, size), p_value=p_value))
+    return sorted(done, key=lambda finalist: -finalist.score)
+
+
+def _sensible(trial: Trial, alpha: np.ndarray) -> bool:
+    """Whether magnitudes are positive, and the first of several harmonics is no bystander.
+
+    A wave whose fundamental is under a quarter of its strongest harmonic is that harmonic's.
+    """
+    if trial.candidate.effect.positive and np.any(alpha < 0):
+        return False
+    if trial.candidate.lines is None or len(alpha) == 2:
+        return True
+    size = np.hypot(alpha[::2], alpha[1::2])
+    return bool(size[0] >= 0.25 * size.max())
+
+
+def _refined(seen, now, trial, basis) -> Finalist:
+    """The candidate refined, the rest of the model fitted along to first order."""
+    found = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
+    betas = (*now.betas, found.betas[0])
+    return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
+
+
+_SPEED = frozenset({"velocity"})
+
+
+def _imitated(trial: Trial, now: Fit) -> bool:
+    """Whether the base may have bent its own curve in velocity to what the candidate is."""
+    velocity = trial.candidate.term.coordinates <= _SPEED and len(trial.beta) < 2
+    return velocity and bool(now.terms[0].nonlinear)
+
+
+def _afresh(seen, now, trial) -> Finalist:
+    """The whole model with the candidate, the base's nonlinear parameters looked for anew."""
+    terms = (*now.terms, trial.candidate.term)
+    found = fit(terms, seen, [None, *now.betas[1:], trial.beta], 8)
+    return Finalist(0.0, trial, 1.0, found.energy, found.betas, found.alphas[-1])
