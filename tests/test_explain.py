@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
-from jaxfric.explanation import candidates, evidence, explain, naming, pulses, question
+from jaxfric.effects import EFFECTS
+from jaxfric.explanation import candidates, evidence, explain, naming, pulses, question, telling
 
 TIME = np.arange(16384) / 1000.0
 COULOMB = 20.0
@@ -106,6 +107,8 @@ def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
         estimate = finding.parameters[name]
         within = 5 * float(estimate.standard_error) + 0.02 * abs(value)
         assert abs(float(estimate.value) - value) < within, name
+    places = {place["coordinate"] for place in found.where}
+    assert places & {name.removesuffix("_lines") for name in EFFECTS[effect].coordinates}
     errors = found.fit["holdout_force_error"]
     assert errors["after"] < 0.8 * errors["before"]
 
@@ -220,3 +223,13 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (asked.base, []))
     found = naming.search(asked.evidence, asked.base, asked.structure)
     assert found.taken == []
+
+
+def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
+    term, alpha, beta = CASES["friction_step"]
+    found = explain(planted(healthy[0], term, alpha, beta), "gaussian")
+    base = question.ask(healthy[0], None, models.named("gaussian")).base
+    places = telling._everywhere([], found.findings, base)
+    assert [place["coordinate"] for place in places] == [EFFECTS["friction_step"].coordinates[0]]
+    assert places[0]["share"] == found.findings[0].share and places[0]["size"] > 0
+    assert telling._everywhere(places, found.findings, base) == places

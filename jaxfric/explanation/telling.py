@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects import EFFECTS
 from ..recording import Recording
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
@@ -50,7 +51,7 @@ def tell(
     )
     return Explanation(
         verdict=_verdict(bool(findings), before, after, _rough(found, asked)),
-        where=[_where(place, units) for place in before],
+        where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(found, asked, first),
         not_visible=_not_visible(found, units),
@@ -153,6 +154,24 @@ def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]
             )  # fmt: skip
         )
     return sorted(findings, key=lambda finding: -finding.share)
+
+
+def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list[dict[str, Any]]:
+    """The places, and where findings act that no free curve shows: at a few rows, say."""
+    for finding in findings:
+        own = [name.removesuffix("_lines") for name in EFFECTS[finding.effect].coordinates]
+        if not own or any(place["coordinate"] in own for place in places):
+            continue
+        power = max(finding.share, 0.0) * first.energy / len(first.residual)
+        place = {
+            "coordinate": own[0],
+            "share": finding.share,
+            "size": float(np.sqrt(power)),
+            "p_value": finding.p_value,
+            "detail": f"where {finding.effect.replace('_', ' ')} acts",
+        }
+        places = [*places, place]
+    return places
 
 
 def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
