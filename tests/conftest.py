@@ -1,5 +1,6 @@
 """Strict settings for every test: double precision, no implicit promotion, no chance."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -17,6 +18,21 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 # Compiling takes longer than any deadline, and a test that fails must fail again when it is rerun.
 settings.register_profile("jaxfric", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("jaxfric")
+
+
+# Every compiled program takes some of the 65 530 memory maps that Linux gives a process by default;
+# the next compilation after the last of them aborts the process.
+MOST_MAPS = 10_000
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_programs():
+    """After a file of tests, compiled programs are let go where there are too many."""
+    yield
+    maps = Path("/proc/self/maps")
+    if maps.exists() and len(maps.read_bytes().splitlines()) > MOST_MAPS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")
