@@ -21,7 +21,7 @@ import jax
 MOST = 48
 # XLA's newer way to emit loops, and its optimisation of them, take five times as long to compile
 # an identification as it then runs quicker on 50,000 samples.
-QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
+_QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
 QUICK_SAMPLES = 2**16
 
 _folder: Path | None = None
@@ -56,6 +56,19 @@ def kept(function: Callable) -> Callable:
         return _call(function, arguments, _folder)
 
     return call
+
+
+@cache
+def quick_options() -> dict[str, Any]:
+    """Options of XLA that compile quickly what is run a few times; those that this jaxlib knows."""
+
+    def known(name: str) -> bool:
+        with suppress(jax.errors.JaxRuntimeError):
+            jax.jit(lambda: 0).lower().compile({name: _QUICK[name]})
+            return True
+        return False
+
+    return {name: value for name, value in _QUICK.items() if known(name)}
 
 
 def _simple(arguments) -> bool:
@@ -124,9 +137,7 @@ def _compile(function, leaves, tree, others):
     # A program out of jax's own cache cannot be written a second time, so it must not get there.
     jax.config.update("jax_persistent_cache_min_compile_time_secs", float("inf"))
     try:
-        program = lowered.compile(QUICK if size <= QUICK_SAMPLES else None)
-    except jax.errors.JaxRuntimeError:  # a jaxlib that knows these options no longer
-        program = lowered.compile()
+        program = lowered.compile(quick_options() if size <= QUICK_SAMPLES else None)
     finally:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", threshold)
     made = structure[-1]

@@ -12,13 +12,13 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.identification import _solve
-from jaxfric.programs import QUICK
+from jaxfric.programs import quick_options
 from jaxfric.projections import Rows
 from jaxfric.search import search
 from jaxfric.terms import Coulomb, Directional, Gaussian, Lorentzian, Sum, Viscous
 
 # Many programs that run once: compiled quickly.
-jit = functools.partial(jax.jit, compiler_options=QUICK)
+jit = functools.partial(jax.jit, compiler_options=quick_options())
 SIZE = 400
 BOX = np.array([[0.004, 0.004], [0.1, 0.1]])
 

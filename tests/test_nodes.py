@@ -9,7 +9,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import compress, search as searching
-from jaxfric.programs import QUICK
+from jaxfric.programs import quick_options
 from jaxfric.projections import Rows
 from jaxfric.terms import Coulomb, Directional, Gaussian, Sum, Viscous
 
@@ -32,7 +32,7 @@ def searches(on_nodes: bool):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(compress, "LEAST_POINTS", 100 if on_nodes else 10**9)
         shapes = [jnp.zeros(SIZE)] * 3 + [jnp.zeros((2, 2))]
-        return jax.jit(run).lower(*shapes).compile(compiler_options=QUICK)
+        return jax.jit(run).lower(*shapes).compile(compiler_options=quick_options())
 
 
 def cost(beta, velocity, force, weight):
