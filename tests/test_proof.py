@@ -2,7 +2,9 @@
 
 import dataclasses
 import json
+import os
 import sys
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from jaxfric import proof
 from jaxfric.cli import main
 from jaxfric.concealed import NAMES, OUTSIDE
 from jaxfric.effects import effect
-from jaxfric.proof import counting, running, scoring, trials
+from jaxfric.proof import counting, running, scoring, trials, workers
 
 RANGE = (0.02, 0.3)
 
@@ -216,16 +218,16 @@ def written(folder, cases):
 def test_answers_that_are_there_are_not_repeated(tmp_path, monkeypatch):
     done = []
 
-    def pool(cases, folder, *_):
+    def work(cases, *_):
         done.append([c.name for c in cases])
-        written(folder, cases)
-        return False
+        written(tmp_path, cases)
+        yield from (workers.Done(c, None, 1.0) for c in cases)
 
-    monkeypatch.setattr(running, "_pool", pool)
+    monkeypatch.setattr(running, "work", work)
     proof.run(tmp_path, 3, 1, RANGE)
     proof.run(tmp_path, 3, 1, RANGE)
     proof.run(tmp_path, 5, 1, RANGE)
-    assert done == [["00001", "00002", "00003"], ["00004", "00005"]]
+    assert done == [["00001", "00002", "00003"], [], ["00004", "00005"]]
     with pytest.raises(ValueError, match="seed 1"):
         proof.run(tmp_path, 3, 2, RANGE)
 
@@ -237,21 +239,55 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
 
 
-def test_a_process_that_dies_costs_its_own_case_only(tmp_path, monkeypatch):
-    def pool(cases, folder, jobs, *_):
-        good = [c for c in cases if c.name != "00002"]
-        written(folder, good if jobs > 1 or good == cases else cases[: cases.index(deadly(cases))])
-        return len(good) < len(cases)
+def do(task):
+    """In a process of its own: what the first letters say; that it was done stands in a file."""
+    file, _, what = task.partition(":")
+    with open(file, "a") as tries:
+        tries.write("x")
+    tried = len(Path(file).read_text())
+    if what == "hang":
+        time.sleep(600)
+    if what == "die" or (what == "die once" and tried == 1):
+        os.kill(os.getpid(), 9)
 
-    def deadly(cases):
-        return next(c for c in cases if c.name == "00002")
 
-    monkeypatch.setattr(running, "_pool", pool)
-    cases = proof.run(tmp_path, 4, 1, RANGE, jobs=2)
-    errors = [score.error for score in proof.scores(tmp_path, cases)]
-    assert errors[1] == "the process died"
-    # The others have answers, if no sealed files: nothing was drawn here.
-    assert len(errors) == 4
+def test_what_hangs_or_dies_costs_itself_only(tmp_path):
+    kinds = ("well", "hang", "die", "die once", "well")
+    tasks = [f"{tmp_path / str(i)}:{kind}" for i, kind in enumerate(kinds)]
+    start = time.monotonic()
+    done = list(workers.work(tasks, do, jobs=2, limit=2.0))
+    assert time.monotonic() - start < 30
+    reasons = {d.task: d.reason for d in done}
+    assert len(done) == 5 and [reasons[t] for t in tasks] == [
+        None, "no answer within 2 s", "the process died of SIGKILL (short of memory?)", None, None
+    ]  # fmt: skip
+    tries = [len((tmp_path / str(i)).read_text()) for i in range(5)]
+    assert tries == [1, 1, 2, 2, 1]
+
+
+def refuse():
+    raise SystemExit(3)
+
+
+def test_processes_that_do_not_start_end_the_run():
+    with pytest.raises(ValueError, match="before they were ready with status 3"):
+        list(workers.work(["a:well"], do, jobs=2, prepare=refuse))
+
+
+def test_a_case_that_is_given_up_is_a_row_with_its_reason(tmp_path, monkeypatch):
+    def work(cases, do, jobs, limit, prepare):
+        assert limit == 5.0
+        written(tmp_path, cases[1:])
+        yield workers.Done(cases[0], "no answer within 5 s", 5.0)
+        yield from (workers.Done(c, None, 1.0) for c in cases[1:])
+
+    monkeypatch.setattr(running, "work", work)
+    cases = proof.run(tmp_path, 2, 1, RANGE, limit=5.0)
+    truth = {"truth": {name: {"size": 0.2} for name in cases[0].effects}}
+    trials.path(tmp_path, trials.SEALED, cases[0]).write_text(json.dumps(truth))
+    first = proof.scores(tmp_path, cases)[0]
+    assert first.error == "no answer within 5 s" and first.seconds == 5.0
+    assert "no answer within 5 s" in proof.report([first], "jaxfric prove")
 
 
 WATCHED = []
@@ -322,7 +358,9 @@ def test_the_truth_is_sealed_first_and_explain_is_told_nothing(tmp_path, quick):
     assert row.error == "ValueError: too short" and not row.within
 
 
-@pytest.mark.parametrize("option", [("--cases", "0"), ("--size", "0.3:0.1"), ("--size", "a")])
+@pytest.mark.parametrize(
+    "option", [("--cases", "0"), ("--size", "0.3:0.1"), ("--size", "a"), ("--limit", "0")]
+)
 def test_options_that_make_no_sense(option, capsys):
     with pytest.raises(SystemExit) as stop:
         main(["prove", *option])

@@ -283,22 +283,4 @@ def _add_fleet(commands) -> None:
 
 
 def _add_prove(commands) -> None:
-    command = _add(commands, "prove", "prove.run", "the concealed-effect benchmark")
-    command.add_argument(
-        "--cases", type=options.count, default=240, metavar="N", help="machines (default: 240)"
-    )
-    command.add_argument(
-        "--seed", type=options.count, default=1, metavar="S", help="of the machines (default: 1)"
-    )
-    command.add_argument(
-        "--jobs", type=options.count, default=1, metavar="K", help="processes (default: 1)"
-    )
-    command.add_argument(
-        "--size",
-        type=options.sizes,
-        default=(0.02, 0.30),
-        metavar="LOW:HIGH",
-        help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",
-    )
-    text = "answers and report; answers that are there stay"
-    command.add_argument("--out", default="jaxfric-proof", metavar="FOLDER", help=text)
+    options.proving(_add(commands, "prove", "prove.run", "the concealed-effect benchmark"))

@@ -105,6 +105,14 @@ def count(text: str) -> int:
     return value
 
 
+def seconds(text: str) -> float:
+    """A time span over zero, s."""
+    value = number(text)
+    if value <= 0:
+        raise ArgumentTypeError(f"{text!r} is not a number of seconds over zero")
+    return value
+
+
 def process(text: str) -> tuple[int, int, str]:
     """`i/n@host:port` as the number of a process, how many there are, and the address of the
     first.
@@ -206,3 +214,33 @@ def gathering(command: ArgumentParser) -> None:
         help="the I-th, from 0, of N such commands on machines that share the folders; "
         "process 0 is reached at HOST:PORT",
     )
+
+
+def proving(command: ArgumentParser) -> None:
+    """Add the options of a proof: which machines, on what, where to."""
+    command.add_argument(
+        "--cases", type=count, default=240, metavar="N", help="machines (default: 240)"
+    )
+    command.add_argument(
+        "--seed", type=count, default=1, metavar="S", help="of the machines (default: 1)"
+    )
+    command.add_argument(
+        "--jobs", type=count, default=1, metavar="K", help="processes (default: 1)"
+    )
+    command.add_argument(
+        "--size",
+        type=sizes,
+        default=(0.02, 0.30),
+        metavar="LOW:HIGH",
+        help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",
+    )
+    command.add_argument(
+        "--limit",
+        type=seconds,
+        default=600.0,
+        metavar="SECONDS",
+        help="a case without answer is given up, and counts as missed, after so many (default: "
+        "600, a hundred times what one takes)",
+    )
+    text = "answers and report; answers that are there stay"
+    command.add_argument("--out", default="jaxfric-proof", metavar="FOLDER", help=text)

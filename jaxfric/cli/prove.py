@@ -11,7 +11,9 @@ from . import _configure
 def run(arguments: Namespace) -> int:
     """Do what is left of the cases, score all, print the short table, write the report."""
     folder, size = Path(arguments.out), arguments.size
-    cases = proof.run(folder, arguments.cases, arguments.seed, size, arguments.jobs, _configure)
+    cases = proof.run(
+        folder, arguments.cases, arguments.seed, size, arguments.jobs, _configure, arguments.limit
+    )
     scores = proof.scores(folder, cases)
     try:
         pictures, missing = proof.draw(scores, folder), ""

@@ -1,21 +1,22 @@
 """Doing the cases of a proof in several processes, and those only that have not been done."""
 
+import functools
 import json
-import multiprocessing
-import os
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 from ..documents import to_json
 from ..io import write_text
 from .planning import Case, plan
-from .trials import ANSWERS, SEALED, failed, path, trial
+from .trials import ANSWERS, SEALED, failed, fingerprint, path, trial
+from .workers import work
 
 ABOUT = "proof.json"
+# A case takes seconds, a process' first one, which compiles, about a minute: what takes ten is a
+# search that does not end, and no user would wait for it either.
+LIMIT = 600.0
 
 
 def run(
@@ -25,31 +26,49 @@ def run(
     size: tuple[float, float],
     jobs: int = 1,
     prepare: Callable[[], object] | None = None,
+    limit: float = LIMIT,
 ) -> list[Case]:
     """Do what is left to do of a proof in a folder; returns its cases.
 
     **Arguments:** `cases`, `seed`, `size`: as [`plan`][jaxfric.proof.plan] takes them;
-    `jobs`: processes; `prepare`: called in each of them first, to configure jax.
+    `jobs`: processes; `prepare`: called in each of them first, to configure jax; `limit`: seconds
+    after which a case is given up. One that is given up, or whose process dies twice, has an answer
+    that says so.
 
     **Raises:** `ValueError` if the folder holds a proof of another seed or size.
     """
     planned = plan(cases, seed, size)
-    _claim(folder, {"seed": seed, "size": list(size)})
-    for part in (SEALED, ANSWERS):
-        (folder / part).mkdir(exist_ok=True)
-    left = _undone(planned, folder)
-    while left:
-        broken = _pool(left, folder, jobs, prepare, len(planned))
-        left = _undone(left, folder)
-        if broken and jobs == 1 and left:  # one at a time, so it was the first
-            answer = failed("the process died") | {"case": left[0].name, "code": None}
-            write_text(path(folder, ANSWERS, left[0]), to_json(answer))
-            left = left[1:]
-        jobs = 1 if broken else jobs
+    claim(folder, {"seed": seed, "size": list(size)})
+    do_all(folder, planned, functools.partial(trial, folder=folder), jobs, prepare, limit)
     return planned
 
 
-def _claim(folder: Path, about: dict) -> None:
+def do_all(
+    folder: Path,
+    cases: Sequence[Case],
+    do: Callable[[Case], object],
+    jobs: int = 1,
+    prepare: Callable[[], object] | None = None,
+    limit: float = LIMIT,
+) -> None:
+    """Do each case that has no answer in a folder yet; what `do` cannot answer is answered here."""
+    for part in (SEALED, ANSWERS):
+        (folder / part).mkdir(exist_ok=True)
+    left = [case for case in cases if not path(folder, ANSWERS, case).is_file()]
+    start, shown = time.monotonic(), sys.stderr.isatty()
+    for number, (case, reason, seconds, _) in enumerate(work(left, do, jobs, limit, prepare), 1):
+        if reason is not None and not path(folder, ANSWERS, case).is_file():
+            answer = failed(reason) | {"seconds": seconds, "case": case.name, "code": fingerprint()}
+            write_text(path(folder, ANSWERS, case), to_json(answer))
+        if shown:
+            pace = _span((time.monotonic() - start) / number * (len(left) - number))
+            text = f"{len(cases) - len(left) + number}/{len(cases)} cases, {pace} left"
+            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+    if shown:
+        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+
+
+def claim(folder: Path, about: dict) -> None:
     """Say in the folder what proof it holds, or raise if it holds another."""
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / ABOUT
@@ -63,44 +82,6 @@ def _claim(folder: Path, about: dict) -> None:
     elif any(folder.iterdir()):
         raise ValueError(f"{folder}: is not empty and holds no proof; give another --out.")
     write_text(file, to_json(about))
-
-
-def _undone(cases: Sequence[Case], folder: Path) -> list[Case]:
-    return [case for case in cases if not path(folder, ANSWERS, case).is_file()]
-
-
-def _pool(cases: Sequence[Case], folder: Path, jobs: int, prepare, total: int) -> bool:
-    """Do cases; returns whether a process died. They are spawned: jax does not survive a fork."""
-    # Read when a process imports numpy: many small matrices, where threads wait for each other.
-    before = os.environ.get("OPENBLAS_NUM_THREADS")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=prepare)
-    try:
-        waiting = [pool.submit(trial, case, folder) for case in cases]
-        _follow(waiting, total)
-    except BrokenProcessPool:
-        return True
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-        if before is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = before
-    return False
-
-
-def _follow(waiting, total: int) -> None:
-    """Wait for all, and say how far it is on a terminal."""
-    start, shown = time.monotonic(), sys.stderr.isatty()
-    for number, future in enumerate(as_completed(waiting), 1):
-        future.result()
-        if shown:
-            left = (time.monotonic() - start) / number * (len(waiting) - number)
-            text = f"{total - len(waiting) + number}/{total} cases, {_span(left)} left"
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-    if shown:
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 def _span(seconds: float) -> str:

@@ -37,7 +37,7 @@ class Score(NamedTuple):
     """One case, scored.
 
     - `name`, `kind`, `seed`, `effects` as planned; `sizes`: of each effect, in parts of Coulomb.
-    - `error`: why there is no answer; the rest is then empty.
+    - `error`: why there is no answer; what follows from one is then empty.
     - `verdict`; `named`: the findings, strongest first; `alike`: all that they are said to be
       confusable with.
     - `exact`: the findings are the truth and nothing else; `among`: the truth is among them;
@@ -98,14 +98,18 @@ def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
 def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any]) -> Score:
     """One case; `sealed` is `None` where its machine could not be drawn."""
     first = Score(case.name, case.kind, case.seed, case.effects, code=answer.get("code"))
-    if answer["error"] is not None or sealed is None:
+    first = first._replace(seconds=answer["seconds"])
+    if sealed is None:
         return first._replace(error=answer["error"] or "the sealed truth is not there")
-    truth, findings = sealed["truth"], answer["findings"]
+    truth = sealed["truth"]
+    first = first._replace(sizes=tuple(truth[name]["size"] for name in case.effects))
+    if answer["error"] is not None:
+        return first._replace(error=answer["error"])
+    findings = answer["findings"]
     named = tuple(finding["effect"] for finding in findings)
     alike = tuple({name: 0 for finding in findings for name in finding["confusable_with"]})
     wanted, held = set(case.effects), answer["fit"]["holdout_force_error"] or {}
     return first._replace(
-        sizes=tuple(truth[name]["size"] for name in case.effects),
         verdict=answer["verdict"],
         named=named,
         alike=alike,
@@ -118,7 +122,6 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         after=held.get("after"),
         oracle=answer["oracle"],
         parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
-        seconds=answer["seconds"],
     )
 
 
