@@ -164,9 +164,41 @@ def test_a_case_that_went_wrong_is_a_miss_in_every_rate():
     table = proof.summary([wrong])
     assert wrong.error == "it broke"
     for label, value in table.items():
-        if label.startswith("one effect"):
+        if label.startswith("one effect:"):
             assert (value.hits, value.total) == (0, 1), label
     assert table["cases that went wrong"].hits == 1
+
+
+def test_a_case_without_answer_counts_at_its_size():
+    truth = {"truth": {"cogging": {"size": 0.12}}}
+    wrong = scoring.score(case("cogging"), truth, trials.failed("it broke") | {"code": None})
+    right = scoring.score(
+        case("cogging"), truth, answer(finding("cogging"), where=("position",)) | {"seconds": 5.0}
+    )
+    table = proof.summary([wrong, right])
+    assert table["one effect, 10 % or more: named exactly"] == (1, 2)
+    assert table["one effect, 10 % or more: its place found"] == (1, 2)
+    assert table["one effect, 5 to 10 %: named exactly"] == (0, 0)
+    assert table["seconds a case, longest"] == 5.0
+    assert counting.confusion([wrong, right]) == (["cogging"], ["cogging", "no answer"], [[1, 1]])
+
+
+def test_the_interval_is_the_one_that_was_given():
+    said = finding("stribeck", stribeck_force=(2.2, 0.1))
+    said["parameters"]["stribeck_force"]["interval"] = [2.01, 2.39]
+    found = scoring.score(case("stribeck"), sealed(stribeck={"stribeck_force": 2.0}), answer(said))
+    assert [p.held for p in found.parameters] == [False]  # 2.31 standard errors would hold it
+
+
+def test_what_the_findings_do_to_a_forward_run():
+    said = answer(finding("cogging")) | {"run": {"before": 0.2, "after": 0.05}}
+    found = scoring.score(case("cogging"), sealed(cogging={}), said)
+    assert counting.quieted(found) == pytest.approx(0.75)
+    assert "| single | 10.00% | 5.00% | 4.00% | 83.33% | 1 | 20.00% | 5.00% | 1 |" in proof.report(
+        [found], "jaxfric prove"
+    )
+    cannot = answer(finding("backlash")) | {"run": {"before": 0.2, "after": None}}
+    assert counting.quieted(scoring.score(case("backlash"), sealed(backlash={}), cannot)) is None
 
 
 def test_the_interval_of_a_share():
@@ -378,3 +410,6 @@ def test_two_real_cases(tmp_path, capsys):
     answers = [trials.read(file) for file in sorted((folder / "answers").iterdir())]
     assert [a["error"] for a in answers] == [None, None]
     assert answers[0]["oracle"] is None and answers[1]["oracle"] > 0
+    assert all(set(a["run"]) == {"before", "after"} for a in answers)
+    for told in answers[1]["findings"]:
+        assert all(len(p["interval"]) == 2 for p in told["parameters"].values())

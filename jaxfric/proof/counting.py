@@ -8,7 +8,13 @@ from .scoring import Parameter, Score
 
 # Edges of the bins of power, in parts of the Coulomb level.
 EDGES = (0.0, 0.02, 0.05, 0.10, 0.20, float("inf"))
-NONE = "none"
+# Levels of size that have a line of their own: text, from, below.
+LEVELS = (
+    ("10 % or more", 0.10, float("inf")),
+    ("5 to 10 %", 0.05, 0.10),
+    ("below 5 %", 0.0, 0.05),
+)
+NONE, FAILED = "none", "no answer"
 
 
 class Rate(NamedTuple):
@@ -63,16 +69,20 @@ def binned(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
 def confusion(scores: Sequence[Score]) -> tuple[list[str], list[str], list[list[int]]]:
     """True effect by the one named first; names of rows and columns, and counts.
 
-    Single effects, those outside the library, and healthy machines, which are the row "none".
+    Single effects, those outside the library, and healthy machines, which are the row "none"; a
+    case that went wrong is in the column "no answer".
     """
     pairs = [
-        (s.effects[0] if s.effects else NONE, s.named[0] if s.named else NONE)
+        (s.effects[0] if s.effects else NONE, FAILED if s.error else (*s.named, NONE)[0])
         for s in scores
-        if s.kind != "pair" and s.error is None
+        if s.kind != "pair"
     ]
+    last = {NONE: 1, FAILED: 2}
+
     # A row beyond the diagonal only where something was drawn, a column only where it was named.
-    true = sorted({row for row, _ in pairs}, key=lambda name: (name == NONE, name))
-    named = sorted({name for pair in pairs for name in pair}, key=lambda n: (n == NONE, n))
+    true = sorted({row for row, _ in pairs}, key=lambda name: (last.get(name, 0), name))
+    columns = {name for pair in pairs for name in pair}
+    named = sorted(columns, key=lambda name: (last.get(name, 0), name))
     counts = [[pairs.count((row, column)) for column in named] for row in true]
     return true, named, counts
 
@@ -93,8 +103,7 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
     healthy, single, pair, outside = (
         of_kind(scores, kind) for kind in ("healthy", "single", "pair", "outside")
     )
-    known = parameters(scores)
-    return {
+    rows: dict[str, Any] = {
         "nothing concealed: called consistent": rate(healthy, lambda s: s.exact),
         "nothing concealed: something named": rate(healthy, lambda s: bool(s.named)),
         "one effect: named exactly": rate(single, lambda s: s.exact),
@@ -102,6 +111,18 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         "one effect: among the named": rate(single, lambda s: s.among),
         "one effect: named or declared confusable": rate(single, lambda s: s.within),
         "one effect: its place found": rate(single, located),
+    }
+    for text, low, high in LEVELS:
+        some = [s for s in single if s.sizes and low <= s.sizes[0] < high]
+        rows |= {
+            f"one effect, {text}: named exactly": rate(some, lambda s: s.exact),
+            f"one effect, {text}: named or declared confusable": rate(some, lambda s: s.within),
+            f"one effect, {text}: its place found": rate(some, located),
+            f"one effect, {text}: parameters' median relative error": middle(
+                p.error for p in parameters(some)
+            ),
+        }
+    return rows | {
         "two effects: both and nothing else": rate(pair, lambda s: s.exact),
         "two effects: both named": rate(pair, lambda s: s.among),
         "two effects: at least one named": rate(pair, lambda s: s.hits > 0),
@@ -111,14 +132,33 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         "outside the library: not called explained": rate(
             outside, lambda s: s.error is None and s.verdict != "explained"
         ),
+        **_whole(scores, [*single, *pair]),
+    }
+
+
+def _whole(scores: Sequence[Score], concealed: Sequence[Score]) -> dict[str, Any]:
+    """The numbers that are not of one kind of case only."""
+    known, seconds = parameters(scores), [s.seconds for s in scores if s.seconds is not None]
+    return {
         "parameters: median relative error": middle(p.error for p in known),
         "parameters: 95 % interval held the truth": covered(known),
-        "held-out error: median part of the oracle's reduction": middle(
-            s.reached for s in (*single, *pair)
+        "held-out force error: median part of the oracle's reduction": middle(
+            s.reached for s in concealed
         ),
-        "seconds a case, median": middle(s.seconds for s in scores),
+        "held-out velocity error, run forward: median part removed": middle(
+            map(quieted, concealed)
+        ),
+        "seconds a case, median": middle(seconds),
+        "seconds a case, longest": max(seconds, default=None),
         "cases that went wrong": rate(scores, lambda s: s.error is not None),
     }
+
+
+def quieted(score: Score) -> float | None:
+    """Part of the velocity error of a forward run that the findings remove."""
+    if score.run_before is None or score.run_after is None:
+        return None
+    return 1 - score.run_after / score.run_before
 
 
 def located(score: Score) -> bool | None:

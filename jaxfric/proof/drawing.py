@@ -23,7 +23,7 @@ def draw(scores: Sequence[Score], folder: Path) -> list[str]:
         raise ValueError('Pictures need matplotlib: pip install "jaxfric[report]".') from error
     drawn = []
     with matplotlib.rc_context({"font.size": 8, "figure.dpi": 120}):
-        if any(s.error is None and s.kind != "pair" for s in scores):
+        if any(s.kind != "pair" for s in scores):
             _save(_confusion(scores), folder / CONFUSION)
             drawn.append(CONFUSION)
         if counted.binned(scores):

@@ -43,8 +43,9 @@ class Score(NamedTuple):
     - `exact`: the findings are the truth and nothing else; `among`: the truth is among them;
       `within`: each true effect is named, or declared confusable with a named one.
     - `located`: one of the coordinates that the catalogue gives each true effect is among those
-      on which structure was found; `None` for effects outside the library.
-    - `before`, `after`, `oracle`: held-out force errors.
+      on which structure was found or a finding acts; `None` for effects outside the library.
+    - `before`, `after`, `oracle`: held-out force errors; `run_before`, `run_after`: held-out
+      velocity errors of the models run forward.
     - `parameters` that truth and finding both have; `seconds` that `explain` took; `code`.
     """
 
@@ -64,6 +65,8 @@ class Score(NamedTuple):
     before: float | None = None
     after: float | None = None
     oracle: float | None = None
+    run_before: float | None = None
+    run_after: float | None = None
     parameters: tuple[Parameter, ...] = ()
     seconds: float | None = None
     code: str | None = None
@@ -108,6 +111,7 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
     findings = answer["findings"]
     named = tuple(finding["effect"] for finding in findings)
     alike = tuple({name: 0 for finding in findings for name in finding["confusable_with"]})
+    run = answer.get("run") or {}
     wanted, held = set(case.effects), answer["fit"]["holdout_force_error"] or {}
     return first._replace(
         verdict=answer["verdict"],
@@ -121,6 +125,8 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         before=held.get("before"),
         after=held.get("after"),
         oracle=answer["oracle"],
+        run_before=run.get("before"),
+        run_after=run.get("after"),
         parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
     )
 
@@ -143,9 +149,20 @@ def _parameters(finding: Mapping[str, Any], truth: Mapping[str, Any]) -> Iterato
         true = values.get(name, values.get(name.rstrip("+-")))
         if not isinstance(true, int | float) or true == 0 or name.endswith("phase"):
             continue
-        found, spread = estimate.get("value"), estimate.get("standard_error")
+        found = estimate.get("value")
         if found is None or not math.isfinite(found):
             continue
-        reach = None if spread is None else student_quantile(0.975, COSINES) * spread
-        held = None if reach is None else bool(abs(found - true) <= reach)
+        low, high = _ends(estimate)
+        held = None if low is None else bool(low <= true <= high)
         yield Parameter(effect, name, float(true), float(found), held)
+
+
+def _ends(estimate: Mapping[str, Any]) -> tuple[float, float] | tuple[None, None]:
+    """The 95 % interval: as it was given, else by Student's t with the library's fewest degrees."""
+    if estimate.get("interval"):
+        return tuple(estimate["interval"])
+    spread = estimate.get("standard_error")
+    if spread is None:
+        return None, None
+    reach = student_quantile(0.975, COSINES) * spread
+    return estimate["value"] - reach, estimate["value"] + reach

@@ -12,8 +12,9 @@ import numpy as np
 
 from ..concealed import Machine, Run, draw, record
 from ..documents import to_json
-from ..explanation import explain
+from ..explanation import Explanation, explain
 from ..explanation.evidence import gather
+from ..explanation.forward import motion_error
 from ..explanation.question import ask, from_position
 from ..explanation.verification import residual
 from ..io import write_text
@@ -68,15 +69,45 @@ def sealed(case: Case, machine: Machine) -> dict[str, Any]:
     }
 
 
-def answered(recording: Recording, baseline: str, holdout: Recording) -> dict[str, Any]:
-    """What `explain` says of two recordings, and how long it takes; it is told nothing else."""
+def answered(recording: Recording, baseline: str, holdout: Recording | None) -> dict[str, Any]:
+    """What `explain` says of two recordings, and how long it takes; it is told nothing else.
+
+    Afterwards its models are run forward.
+    """
     start = time.perf_counter()
     found = explain(recording, baseline, holdout)
     seconds = time.perf_counter() - start
     document = found.to_dict()
     kept = {key: document[key] for key in KEPT}
+    for finding, told in zip(kept["findings"], found.findings, strict=True):
+        for name, estimate in told.parameters.items():
+            finding["parameters"][name] |= _interval(estimate)
     facts = {"baseline": baseline, "recording": document["recording"], "seconds": seconds}
-    return {"error": None, **kept, **facts}
+    return {"error": None, **kept, **facts, "run": _run(found, recording, holdout)}
+
+
+def _interval(estimate) -> dict[str, Any]:
+    """The 95 % interval as the explanation gives it, where it is bounded."""
+    ends = [float(end) for end in estimate.interval()]
+    return {"interval": ends} if np.isfinite(ends).all() else {}
+
+
+def _run(found: Explanation, recording: Recording, holdout: Recording | None) -> dict[str, Any]:
+    """Relative velocity errors of both models run forward, driven by the held-out force.
+
+    Without anything found they are one model, and not run; `None` for one that cannot run forward.
+    """
+    if not found.findings:
+        return {"before": None, "after": None}
+    judge = recording if holdout is None else holdout
+    errors = {}
+    for when, model in (("before", found.baseline), ("after", found.model)):
+        try:
+            error = motion_error(model, judge)
+        except (ValueError, RuntimeError):  # what explain said stands without it
+            error = None
+        errors[when] = None if error is None or not np.isfinite(error) else error
+    return errors
 
 
 def oracle(run: Run, machine: Machine) -> float | None:

@@ -6,6 +6,7 @@ from typing import Any
 from ..concealed import NAMES
 from . import counting as counted
 from .counting import Rate, middle, of_kind, rate
+from .planning import KINDS
 from .scoring import LEAST_REDUCTION, Parameter, Score
 
 METHOD = f"""\
@@ -23,22 +24,44 @@ that disturbs. Its answer is written to `answers/`. Scoring opens `sealed/` afte
   `consistent`. *Among*: every true effect is named. *Within the class*: every true effect is named
   or stands in a finding's `confusable_with`.
 - *Place*: one of the coordinates that the catalogue gives the true effect is among those on which
-  structure was found.
+  structure was found, or on which a finding acts.
 - *Oracle*: the true concealed force is subtracted from the measured force of both recordings, the
   baseline is fitted to what is left of the first and predicts what is left of the second with
   nothing refitted; its error is the norm of that residual over the norm of the held-out force as
   measured. *Part of the oracle's reduction*: (before − after)/(before − oracle), of cases where
   the oracle removes {LEAST_REDUCTION:.0%} of the error or more, and not of `disturbance_pulses`,
   which come at other moments in the held-out recording.
+- *Velocity run forward*: the model, driven by the held-out force, is started anew from the
+  recorded motion every fifth of the time between reversals; norm of what its velocity is off over
+  norm of the velocity. Of cases where something was found and both models can run: not presliding,
+  faults of the actuator or delays.
 - *Parameters*: those of rightly named effects that have the same name in truth and finding; error
-  relative to the truth; 95 % intervals by Student's t.
+  relative to the truth; the 95 % intervals are those that the explanation gives.
+- A case that has no answer within the time limit, or whose process dies twice, has gone wrong.
 - Brackets hold the 95 % interval of a share (Wilson). A case that went wrong counts as a miss."""
 
+AGAIN = """\
+`from jaxfric.concealed import draw, record; run = record(draw(SEED, (EFFECTS…), SIZES))` makes the
+recordings of a machine again: its seed and effects are in the table, its range of sizes is the
+command's."""
 
-def report(scores: Sequence[Score], command: str, pictures: Sequence[str] = ()) -> str:
-    """The report of scored cases, made by a command; `pictures`: files beside the report."""
+
+def report(
+    scores: Sequence[Score],
+    command: str,
+    pictures: Sequence[str] = (),
+    *,
+    title: str = "Concealed effects",
+    method: str = METHOD,
+    more: Sequence[str] = (),
+) -> str:
+    """The report of scored cases, made by a command.
+
+    **Arguments:** `pictures`: files beside the report; `title`, and `method`: how the cases were
+    made and judged; `more`: further parts, before the cases that were missed.
+    """
     parts = [
-        f"# Concealed effects: {len(scores)} cases",
+        f"# {title}: {len(scores)} cases",
         f"`{command}`",
         _code(scores),
         table(("", "share or value", "cases"), _short(scores)),
@@ -51,12 +74,18 @@ def report(scores: Sequence[Score], command: str, pictures: Sequence[str] = ()) 
         _confusion(scores),
         "## Parameters of rightly named effects",
         _parameters(counted.parameters(scores)),
-        "## Held-out force error, median",
+        "## Parameters and reduction of the held-out error, by size",
+        _by_size(scores),
+        "## Errors on the held-out recording, median",
         _errors(scores),
+        "## Seconds a case",
+        _seconds(scores),
+        *more,
         "## Cases that were missed",
+        AGAIN,
         _missed(scores),
         "## How this is done",
-        METHOD,
+        method,
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
@@ -78,10 +107,11 @@ def table(head: Sequence[str], rows: Any) -> str:
 
 
 def _short(scores: Sequence[Score]):
+    """Rows of the short table: of what there are cases."""
     for label, value in counted.summary(scores).items():
-        if isinstance(value, Rate):
+        if isinstance(value, Rate) and value.total:
             yield label, share(value), f"{value.hits}/{value.total}"
-        else:
+        elif isinstance(value, float):
             yield label, _number(value), ""
 
 
@@ -158,15 +188,42 @@ def _errors_of(some: Sequence[Parameter]) -> tuple[str, str, str]:
     return str(len(some)), _number(error, ".1%"), share(counted.covered(some))
 
 
+def _by_size(scores: Sequence[Score]) -> str:
+    rows = []
+    for name, some in counted.binned(scores):
+        reached = [s.reached for s in some if s.reached is not None]
+        rows.append(
+            (name, *_errors_of(counted.parameters(some)), _number(middle(reached), ".1%"),
+             str(len(reached)))
+        )  # fmt: skip
+    head = ("one effect", "parameters", "median error", "95 % interval held it",
+            "part of the oracle's reduction, median", "of cases")  # fmt: skip
+    return table(head, rows)
+
+
+def _seconds(scores: Sequence[Score]) -> str:
+    rows = []
+    for kind in KINDS.values():
+        times = sorted(s.seconds for s in of_kind(scores, kind) if s.seconds is not None)
+        if times:
+            late = times[min(int(0.9 * len(times)), len(times) - 1)]
+            rows.append((kind, *(f"{t:.1f}" for t in (middle(times), late, times[-1]))))
+    return table(("", "median", "nine of ten below", "longest"), rows)
+
+
 def _errors(scores: Sequence[Score]) -> str:
     rows = []
-    for kind in ("healthy", "single", "pair", "outside"):
+    for kind in KINDS.values():
         some = [s for s in of_kind(scores, kind) if s.error is None]
         if some:
             values = [middle(getattr(s, what) for s in some) for what in _WHAT]
             count = str(sum(s.reached is not None for s in some))
-            rows.append((kind, *(_number(v, ".2%") for v in values), count))
-    head = ("", "before", "after", "oracle", "part of the oracle's reduction", "of cases")
+            both = [s for s in some if counted.quieted(s) is not None]
+            run = [middle(getattr(s, what) for s in both) for what in ("run_before", "run_after")]
+            cells = (*(_number(v, ".2%") for v in values), count)
+            rows.append((kind, *cells, *(_number(v, ".2%") for v in run), str(len(both))))
+    head = ("", "force before", "after", "oracle", "part of the oracle's reduction", "of cases",
+            "velocity run forward, before", "after", "of cases")  # fmt: skip
     return table(head, rows)
 
 
