@@ -1,110 +1,121 @@
-"""Known effects planted in a real recording, and what `explain` calls them.
+"""Known effects planted in real recordings, and what `explain` calls them.
 
-Adding a known force of the recorded motion to the recorded force makes exactly the recording of a
-machine with that physics at the same motion. Each term of the library is drawn at a random place
-where the recording can tell it from the baseline, its force a given share of the Coulomb level.
+    python benchmarks/planted.py --out planted --seed 1
 
-    python benchmarks/planted.py FILE --columns force=vir,position=qm --scale force=35.15 \\
-        --coulomb 20 --sizes 0.05,0.1,0.2
+plants in the recordings of `recordings.py`, found in the folder that JAXFRIC_DATA names or in
+`../shared/data` beside the project; or in one of your own:
+
+    python benchmarks/planted.py axis.csv --holdout other.csv --baseline gaussian --out planted
+
+Scores, report and pictures are those of `jaxfric prove`; interrupted, it goes on where it was.
 """
 
 import argparse
-import dataclasses
 import os
+import sys
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-import jax
-import jax.numpy as jnp
-import numpy as np
+import recordings
 
-import jaxfric as jf
-from jaxfric.cli import options
-from jaxfric.explanation import explain
-from jaxfric.explanation.candidates import candidates, scaled
-from jaxfric.explanation.chance import Judge
-from jaxfric.explanation.predictions import with_predictions
-from jaxfric.explanation.question import ask
+from jaxfric import proof
+from jaxfric.cli import _configure, options
+from jaxfric.io import write_text
+from jaxfric.proof import planting
+from jaxfric.proof.writing import rates, table
 
-# A place where more than this part of the force is new to the baseline: elsewhere there is nothing
-# to be found.
-VISIBLE = 0.3
+METHOD = """\
+To the recorded force of a real machine the force of one effect is added, computed from the recorded
+position, velocity and time by the functions that also conceal it in drawn machines: the recording
+of a machine with that physics, at the same motion. Only effects that are such a force are planted:
+not presliding, lag, backlash, compliance, delays and faults of the actuator, which would have moved
+otherwise; no asymmetry, which every one of these machines has; nothing of another axis. The
+baseline is fitted, each direction of motion with its own parameters.
+
+- *Size*: root mean square of the planted force over the recording, in parts of the Coulomb level
+  that `identify` finds in it.
+- A real machine has findings of its own, with nothing planted: they are in the table above. Every
+  answer is judged by its difference to that one. A finding that was there before (the same effect,
+  and the same place where it has one, within 2 %) is not counted; one that is new and was not
+  planted is a false one. A place counts as found if it was not there before, or if its structure
+  has grown by half of the planted force's power.
+- *Before* is the held-out error freed of what the machine's own findings remove, in squares; the
+  *oracle* has the planted force taken away and its own findings kept.
+- An effect that the recording has already, planted once more, cannot be told from its own unless
+  it has a place: it counts as missed.
+- The rest is as in the report of `jaxfric prove`."""
 
 
 def main() -> None:
-    """Print a row for each term and size, and the totals."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("file")
-    parser.add_argument("--columns", type=options.names, default={})
-    parser.add_argument("--scale", type=options.factors, default={})
-    parser.add_argument("--coulomb", type=float, required=True, help="in the unit of the force")
-    parser.add_argument("--sizes", default="0.05,0.1,0.2")
-    parser.add_argument("--baseline", default="coulomb-viscous")
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    jax.config.update("jax_enable_x64", True)
-    recording = jf.read(arguments.file, columns=arguments.columns, scale=arguments.scale)
-    recording = dataclasses.replace(recording, velocity=None)
-    there = {f.effect for f in explain(recording, arguments.baseline).findings}
-    print(f"in the recording itself: {', '.join(sorted(there)) or 'nothing'}\n")
+    """Do what is left, and write report and pictures to the folder."""
+    arguments = parse()
+    _configure()
+    folder, logs = Path(arguments.out), chosen(arguments)
     sizes = [float(size) for size in arguments.sizes.split(",")]
-    totals: dict[float, list[tuple[bool, bool, bool]]] = {size: [] for size in sizes}
-    for effect, force in _planted(recording, arguments.baseline, arguments.seed):
-        row = []
+    cases = planting.run(
+        folder, logs, sizes, arguments.each, arguments.seed, arguments.jobs, _configure,
+        arguments.limit,
+    )  # fmt: skip
+    scores = planting.scores(folder, cases)
+    command = (
+        f"python benchmarks/planted.py --seed {arguments.seed} --each {arguments.each} "
+        f"--sizes {arguments.sizes}"
+    )
+    more = [
+        "## By recording and size",
+        by_recording(scores, logs, sizes),
+        "## The recordings as they are",
+        table(("", "verdict", "findings", "force error before, after"),
+              planting.described(folder, cases)),
+    ]  # fmt: skip
+    text = proof.report(
+        scores, command, proof.draw(scores, folder), title="Planted effects", method=METHOD,
+        more=more,
+    )  # fmt: skip
+    write_text(folder / "report.md", text)
+    print(proof.short(scores))
+    print(f"\n{more[1]}\n\n{more[3]}\n\nWritten to {folder}: report.md")
+
+
+def by_recording(scores, logs, sizes) -> str:
+    """The power table, for each recording and size."""
+    rows = []
+    for log in logs:
         for size in sizes:
-            added = jnp.asarray(size * arguments.coulomb * force)
-            found = explain(
-                dataclasses.replace(recording, force=recording.force + added), arguments.baseline
-            ).findings
-            names = [f.effect for f in found]
-            alike = {name for f in found for name in f.confusable_with}
-            totals[size].append(
-                (names[:1] == [effect], effect in names, effect in {*names, *alike})
-            )
-            row.append("first" if names[:1] == [effect] else "named" if effect in names else
-                       "class" if effect in alike else "-")  # fmt: skip
-        print(f"{effect:30}" + "".join(f"{cell:>8}" for cell in row), flush=True)
-    for size, rows in totals.items():
-        first, named, alike = np.mean(rows, axis=0)
-        print(f"{size:.0%} of Coulomb: first {first:.0%}, named {named:.0%}, in class {alike:.0%}")
+            some = [
+                s for s in scores
+                if s.name.startswith(f"{log.name}-") and s.sizes and abs(s.sizes[0] - size) < 1e-6
+            ]  # fmt: skip
+            rows.append((f"{log.name}, {size:.0%}", str(len(some)), *rates(some)))
+    return table(("", "cases", "exactly", "first", "among", "within the class", "place"), rows)
 
 
-def _planted(recording, baseline, seed):
-    """Every term at a random place: effect, and force at the samples, unit mean square in slip."""
-    draw = np.random.default_rng(seed)
-    asked = ask(recording, None, jf.models.named(baseline))
-    seen = with_predictions(asked.evidence, asked.base)
-    judge = Judge(asked.base, asked.block)
-    prepared = jf.signals.prepare(recording)
-    time = np.asarray(prepared.time)
-    nodes = np.asarray(seen.motion.time)[: seen.nodes]
-    channels = {
-        name: jnp.asarray(np.interp(time, nodes, np.asarray(values)[: seen.nodes]))
-        for name, values in seen.motion.channels.items()
-    }
-    motion = dataclasses.replace(prepared, channels=channels)
-    slips = np.abs(np.asarray(prepared.velocity)) > asked.evidence.limits.slowest
-    for candidate in candidates(seen, jf.models.named(baseline)):
-        raw = scaled(candidate.columns(seen))
-        new = np.array([_new(judge, raw[i : i + 1]) for i in range(len(raw))])
-        places = np.flatnonzero(new > max(VISIBLE * new.max(), 0.02))
-        if not len(places):
-            continue
-        place, term = candidate.betas[draw.choice(places)], candidate.term
-        alpha = draw.normal(size=raw.shape[1])
-        alpha = np.abs(alpha) if candidate.effect.positive else alpha
-        term = term.with_beta(jnp.asarray(place)) if len(place) else term
-        force = np.asarray(term.columns(motion)) @ alpha
-        if term.inertial:
-            force = force + np.gradient(np.asarray(term.momentum(motion)) @ alpha, time)
-        yield candidate.effect.name, force / np.sqrt(np.mean(force[slips] ** 2))
+def chosen(arguments) -> list[planting.Log]:
+    """The recording of the command line, or those of the folder that are there."""
+    if arguments.file:
+        reading = {"columns": arguments.columns, "scale": arguments.scale, "units": arguments.units}
+        file = Path(arguments.file)
+        return [planting.Log(file.stem, str(file), arguments.holdout, arguments.baseline, reading)]
+    logs = recordings.logs()
+    if not logs:
+        sys.exit("No recordings: name a file, or let JAXFRIC_DATA name the folder with them.")
+    return logs
 
 
-def _new(judge, raw) -> float:
-    own, _ = judge.fresh(raw)
-    whole = float(np.sum(raw**2))
-    inside = np.einsum("gkj,glj->gkl", raw, own)
-    return float(np.sqrt(np.sum(inside**2) / whole)) if whole > 0 else 0.0
+def parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("file", nargs="?", help="a recording of your own")
+    parser.add_argument("--holdout", help="a second one, only judged on")
+    parser.add_argument("--baseline", default="coulomb-viscous")
+    parser.add_argument("--sizes", default="0.05,0.1,0.2", help="in parts of the Coulomb level")
+    parser.add_argument("--each", type=options.count, default=10, help="cases a size, recording")
+    parser.add_argument("--seed", type=options.count, default=1)
+    parser.add_argument("--jobs", type=options.count, default=1)
+    parser.add_argument("--limit", type=options.seconds, default=600.0)
+    parser.add_argument("--out", default="planted")
+    options.reading(parser)
+    return parser.parse_args()
 
 
 if __name__ == "__main__":

@@ -46,9 +46,9 @@ def plan(cases: int, seed: int, size: tuple[float, float]) -> list[Case]:
     rng = np.random.default_rng((seed, 0))
     rows = {
         "healthy": itertools.repeat(()),
-        "single": ((name,) for name in _turns(NAMES, np.random.default_rng((seed, 1)))),
+        "single": ((name,) for name in turns(NAMES, np.random.default_rng((seed, 1)))),
         "pair": _pairs(np.random.default_rng((seed, 2))),
-        "outside": ((name,) for name in _turns(OUTSIDE, np.random.default_rng((seed, 3)))),
+        "outside": ((name,) for name in turns(OUTSIDE, np.random.default_rng((seed, 3)))),
     }
     found = []
     for number, letter in zip(range(cases), itertools.cycle(PATTERN), strict=False):
@@ -58,7 +58,7 @@ def plan(cases: int, seed: int, size: tuple[float, float]) -> list[Case]:
     return found
 
 
-def _turns(names: tuple[str, ...], rng: Generator) -> Iterator[str]:
+def turns(names: tuple[str, ...], rng: Generator) -> Iterator[str]:
     """Each name once in a random order, then again in another."""
     while True:
         yield from (names[i] for i in rng.permutation(len(names)))
@@ -66,15 +66,15 @@ def _turns(names: tuple[str, ...], rng: Generator) -> Iterator[str]:
 
 def _pairs(rng: Generator) -> Iterator[tuple[str, str]]:
     """Two names at a time, the next in turn with the first of those after it that is unlike it."""
-    turns = _turns(NAMES, rng)
+    names = turns(NAMES, rng)
     waiting: list[str] = []
     while True:
-        first = waiting.pop(0) if waiting else next(turns)
+        first = waiting.pop(0) if waiting else next(names)
         second = next((name for name in waiting if _unlike(first, name)), None)
         if second is not None:
             waiting.remove(second)
         while second is None:
-            name = next(turns)
+            name = next(names)
             if _unlike(first, name):
                 second = name
             else:

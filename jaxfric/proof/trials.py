@@ -57,7 +57,7 @@ def failed(text: str) -> dict[str, Any]:
 
 def sealed(case: Case, machine: Machine) -> dict[str, Any]:
     """What is true of a case."""
-    truth = {name: _plain(values) for name, values in machine.truth.items()}
+    truth = {name: plain(values) for name, values in machine.truth.items()}
     return {
         "case": case.name,
         "kind": case.kind,
@@ -143,12 +143,12 @@ def _nameless(recording: Recording, case: Case) -> Recording:
     return dataclasses.replace(recording, source=f"case {case.name}")
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Numbers of numpy as those of Python."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -139,10 +139,11 @@ def _code(scores: Sequence[Score]) -> str:
 
 def _power(groups) -> str:
     head = ("", "cases", "exactly", "named first", "among", "within the class", "place")
-    return table(head, [(name, str(len(some)), *_rates(some)) for name, some in groups])
+    return table(head, [(name, str(len(some)), *rates(some)) for name, some in groups])
 
 
-def _rates(some: Sequence[Score]) -> list[str]:
+def rates(some: Sequence[Score]) -> list[str]:
+    """Of some cases: exactly, first, among, within the class, place."""
     return [
         share(rate(some, holds))
         for holds in (
