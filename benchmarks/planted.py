@@ -37,14 +37,19 @@ baseline is fitted, each direction of motion with its own parameters.
   that `identify` finds in it.
 - A real machine has findings of its own, with nothing planted: they are in the table above. Every
   answer is judged by its difference to that one. A finding that was there before (the same effect,
-  and the same place where it has one, within 2 %) is not counted; one that is new and was not
-  planted is a false one. A place counts as found if it was not there before, or if its structure
+  and the same place where it has one, within 2 % or two standard errors) is not counted, nor is one
+  that is declared confusable with an own one that is not named again, unless it is the planted one;
+  what else is new and was not planted is false. A place counts as found if it was not there before, or if its structure
   has grown by half of the planted force's power.
 - *Before* is the held-out error freed of what the machine's own findings remove, in squares; the
   *oracle* has the planted force taken away and its own findings kept.
 - An effect that the recording has already, planted once more, cannot be told from its own unless
   it has a place: it counts as missed.
 - The rest is as in the report of `jaxfric prove`."""
+
+AGAIN = """\
+The same command plants the same forces; the truth of each case is in `sealed/`, what `explain` said,
+its own findings included, in `answers/`."""
 
 
 def main() -> None:
@@ -71,7 +76,7 @@ def main() -> None:
     ]  # fmt: skip
     text = proof.report(
         scores, command, proof.draw(scores, folder), title="Planted effects", method=METHOD,
-        more=more,
+        again=AGAIN, more=more,
     )  # fmt: skip
     write_text(folder / "report.md", text)
     print(proof.short(scores))

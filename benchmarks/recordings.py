@@ -30,12 +30,12 @@ def logs() -> list[Log]:
     """Those to plant in, of which the files are there."""
     at = folder()
     known = [
-        ("emps", "emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", EMPS),
-        ("delta_servo", "delta_servo/S1_1.csv", "delta_servo/S1_2.csv", SERVO),
-        ("ur10e", "ur10e/joint_1.csv", None, JOINT),
+        ("emps", "coulomb-viscous", "emps/DATA_EMPS.mat", "emps/DATA_EMPS_PULSES.mat", EMPS),
+        ("delta_servo", "coulomb-viscous", "delta_servo/S1_1.csv", "delta_servo/S1_2.csv", SERVO),
+        ("ur10e", "gaussian", "ur10e/joint_1.csv", None, JOINT),  # with an evident bump
     ]
     return [
-        Log(name, str(at / file), held and str(at / held), "coulomb-viscous", reading)
-        for name, file, held, reading in known
+        Log(name, str(at / file), held and str(at / held), baseline, reading)
+        for name, baseline, file, held, reading in known
         if (at / file).is_file()
     ]

@@ -53,12 +53,13 @@ def report(
     *,
     title: str = "Concealed effects",
     method: str = METHOD,
+    again: str | None = None,
     more: Sequence[str] = (),
 ) -> str:
     """The report of scored cases, made by a command.
 
     **Arguments:** `pictures`: files beside the report; `title`, and `method`: how the cases were
-    made and judged; `more`: further parts, before the cases that were missed.
+    made and judged; `again`: how one is made again; `more`: further parts, before the cases that were missed.
     """
     parts = [
         f"# {title}: {len(scores)} cases",
@@ -82,7 +83,7 @@ def report(
         _seconds(scores),
         *more,
         "## Cases that were missed",
-        AGAIN,
+        AGAIN if again is None else again,
         _missed(scores),
         "## How this is done",
         method,
