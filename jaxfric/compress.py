@@ -7,22 +7,27 @@ the Lagrange polynomials there (interpolatory quadrature; Trefethen, "Approximat
 and Approximation Practice", 2013, ch. 3 and 19). Its cost does not depend on the number of samples.
 """
 
-import jax
+from collections.abc import Callable
+from functools import cache
+
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
-from .reduced import Moments
+from .reduced import PLACES, Moments, taken_off
 
 # A polynomial through 20 points carries exp(−v²) over an octave to rounding.
 ORDER = 20
 # 13 octaves from the finest panel to the fastest speed: a ratio of 8000.
 PANELS = 13
-# One pass over the samples costs about as much as 70 bumps, and the refinement evaluates 30 more;
+# Samples are summed over pieces of a panel first. What 20 polynomials carry over a panel, 6 carry
+# over a 64th of it (each is worth a factor of some 2 · 64), and a sample adds to fewer sums.
+PIECES = 64
+PIECE_ORDER = 6
+# One pass over the samples costs about as much as 20 bumps, and the refinement evaluates 30 more;
 # smaller grids are not worth it.
 LEAST_POINTS = 100
-# Samples at a time: their 20 polynomials stay in the cache.
-_BLOCK = 1024
 
 
 def edges(
@@ -49,71 +54,179 @@ def nodes(panels: Float[Array, " P+1"]) -> Float[Array, " M"]:
 
 
 def compress(
-    speed: Float[Array, " N"], values: Float[Array, "k N"], panels: Float[Array, " P+1"]
-) -> Float[Array, "k M"]:
+    speed: Float[Array, " N"],
+    side: Int[Array, " N"],
+    values: Float[Array, "k N"],
+    panels: Float[Array, " P+1"],
+) -> Float[Array, "2 k M"]:
     """Weights on the nodes: Σₙ values f(vₙ) = Σₘ weights f(ξₘ) for every f smooth on the panels.
 
-    **Arguments:** `speed`, m/s; `values`, what f is summed with, zero for samples out of the
-    panels; `panels`, from [`edges`][].
+    **Arguments:** `speed`, m/s; `side`, 0 or 1, the sum that a sample goes into; `values`, what f
+    is summed with, zero for samples out of the panels; `panels`, from [`edges`][].
     """
-    rows, count = values.shape
-    blocks = -(-count // _BLOCK)
-    fill = blocks * _BLOCK - count
-    speed = jnp.pad(speed, (0, fill), mode="edge").reshape(blocks, _BLOCK)
-    values = jnp.pad(values, ((0, 0), (0, fill))).reshape(rows, blocks, _BLOCK)
-
-    def add(total, block):
-        v, weights = block
-        panel = jnp.clip(jnp.searchsorted(panels, v, side="right") - 1, 0, PANELS - 1)
-        low, high = panels[panel], panels[panel + 1]
-        place = jnp.clip((2 * v - low - high) / (high - low), -1.0, 1.0)
-        items = _polynomials(place)[:, :, None] * weights.T[:, None, :]
-        return total.at[panel].add(items), None
-
-    empty = jnp.zeros((PANELS, ORDER, rows), speed.dtype)
-    sums = jax.lax.scan(add, empty, (speed, jnp.swapaxes(values, 0, 1)))[0]
-    spread = jnp.asarray(_from_polynomials(), speed.dtype)
-    return jnp.einsum("pkr,km->rpm", sums, spread).reshape(rows, -1)
+    panel = jnp.searchsorted(panels, speed, side="right", method="compare_all") - 1
+    panel = jnp.clip(panel, 0, PANELS - 1).astype(side.dtype)
+    scale = PIECES / jnp.diff(panels)
+    place = jnp.clip((speed - panels[panel]) * scale[panel], 0.0, PIECES)
+    whole = jnp.minimum(jnp.floor(place), PIECES - 1)
+    powers = _polynomials(2 * (place - whole) - 1, PIECE_ORDER)
+    items = jnp.concatenate([x[:, None] * powers for x in values], axis=1)
+    empty = jnp.zeros((2 * PANELS * PIECES, items.shape[1]), speed.dtype)
+    piece = (side * PANELS + panel) * PIECES + whole.astype(side.dtype)
+    sums = empty.at[piece].add(items)
+    sums = sums.reshape(2, PANELS, PIECES, len(values), PIECE_ORDER)
+    spread = jnp.asarray(_from_pieces(), speed.dtype)
+    return jnp.einsum("spikl,ilm->skpm", sums, spread).reshape(2, len(values), -1)
 
 
-def compressed(rows: Moments, speed: Float[Array, " N"], panels: Float[Array, " P+1"]) -> Moments:
-    """The same [`Moments`][jaxfric.reduced.Moments] for bumps given at the nodes, not the samples.
+class Lines(eqx.Module):
+    """Two functions of speed in each direction, scale · (1, speed − centre); `(2,)`, `(2, 2)`."""
 
-    For rows whose columns without β are a constant and the speed (Coulomb and viscous), and
-    bumps without parity: on the nodes the straight line is taken off that way.
+    centre: Float[Array, " 2"]
+    scale: Float[Array, "2 2"]
+
+    def __call__(self, speed: Float[Array, " n"]) -> Float[Array, "2 2 n"]:
+        """Their values in both directions."""
+        rise = speed[None, :] - self.centre[:, None]
+        return self.scale[:, :, None] * jnp.stack([jnp.ones_like(rise), rise], axis=1)
+
+    def of(self, speed: Float[Array, " n"], side: Int[Array, " n"]) -> list[Float[Array, " n"]]:
+        """Their values, each in its sample's direction."""
+        first, second = _of(side, self.scale)
+        return [first, second * (speed - _of(side, self.centre))]
+
+
+def orthonormal_lines(speed: Float[Array, " n"], weights: Float[Array, "2 n"]) -> Lines:
+    """The [`Lines`][] that are orthonormal over weighted places; zero where there are none."""
+    total, moment = jnp.sum(weights, axis=1), weights @ speed
+    there = total > 0
+    centre = moment / jnp.where(there, total, 1.0)
+    square = jnp.sum(weights * (speed[None, :] - centre[:, None]) ** 2, axis=1)
+    squares = jnp.stack([total, square], axis=1)
+    # Rounding alone, where all samples have one speed.
+    least = 1e3 * jnp.finfo(speed.dtype).eps * total * centre**2
+    there = squares > jnp.stack([jnp.zeros_like(least), least], axis=1)
+    return Lines(centre, jnp.where(there, 1 / jnp.sqrt(jnp.where(there, squares, 1.0)), 0.0))
+
+
+class Straightened(eqx.Module):
+    """Samples of two directions, the best straight line of each taken off the force.
+
+    `speed`, m/s, `side`, 0 or 1, the direction, `weight`, s, and the `force` left, N, all `(N,)`;
+    `lines`, orthonormal over the samples of each direction.
     """
-    directions, length = rows.against.shape[:2]
-    stacked = jnp.concatenate([rows.against.reshape(directions * length, -1), rows.weights])
-    sums = compress(speed, stacked, panels)
-    against = sums[: directions * length].reshape(directions, length, -1)
-    places = nodes(panels)
-    top = panels[-1]
-    line = jnp.stack([jnp.ones_like(places), places / top], axis=1)
-    weight = sums[directions * length :]
-    total = jnp.sum(weight, axis=0)
-    mean = jnp.sum(total * line[:, 1]) / jnp.sum(total)
-    slope = line[:, 1] - mean
-    spread = jnp.sum(total * slope**2)
-    spread = jnp.where(spread > 0, spread, 1.0)
-    shared = jnp.stack([line[:, 0], slope], axis=1)
-    dual = jnp.stack([total / jnp.sum(total), total * slope / spread], axis=1)
-    return Moments(shared, dual, against, weight, rows.whole)
+
+    speed: Float[Array, " N"]
+    side: Int[Array, " N"]
+    weight: Float[Array, " N"]
+    force: Float[Array, " N"]
+    lines: Lines
+
+    def gains(
+        self,
+        bumps: Callable[[Float[Array, " n"], Int[Array, " n"]], Float[Array, "k n"]],
+        shares: Float[Array, "2 2 k"],
+    ) -> Float[Array, "2 k"]:
+        """What bumps take off the cost, as [`Moments.gains`][jaxfric.reduced.Moments.gains], N²·s.
+
+        **Arguments:** `bumps`, of speeds and directions; `shares`, about what each direction's
+        lines have in each bump: taken off first, for rounding.
+        """
+        lines, share = self.lines.of(self.speed, self.side), _of(self.side, shares)
+        left = bumps(self.speed, self.side)
+        left = left - share[0] * lines[0][None, :] - share[1] * lines[1][None, :]
+        weights = [jnp.where(self.side == i, self.weight, 0.0) for i in range(2)]
+
+        def total(values):
+            # Sums over all samples one by one: XLA does each in one pass, without a copy.
+            return jnp.stack([jnp.stack([jnp.sum(w * x) for x in values]) for w in weights])
+
+        first, second, along = (total(left * x[None, :]) for x in (*lines, self.force))
+        size = total(left**2)
+        most = size + jnp.sum(shares**2, axis=1)
+        return taken_off(along, size, first**2 + second**2, most)
 
 
-def _points():
-    return np.cos(np.pi * (np.arange(ORDER) + 0.5) / ORDER)
+def compressed(
+    speed: Float[Array, " N"],
+    force: Float[Array, " N"],
+    weights: Float[Array, "2 N"],
+    panels: Float[Array, " P+1"],
+) -> tuple[Moments, Straightened]:
+    """The [`Moments`][jaxfric.reduced.Moments] of bumps given at the nodes, beside the samples.
+
+    For columns without β that are a constant and the speed (Coulomb and viscous).
+
+    **Arguments:** `speed`, m/s; `force` along the motion, N; `weights` of each direction, s, of
+    which a sample has at most one; `panels`, from [`edges`][].
+    """
+    side, weight = (weights[1] > 0).astype(jnp.int32), jnp.sum(weights, axis=0)
+    # What a line through some of the samples explains goes first: where the force has a large
+    # offset, sums of what is left keep their digits.
+    some = slice(None, None, max(1, speed.shape[0] // PLACES))
+    rough = orthonormal_lines(speed[some], weights[:, some])
+    share = _shares(rough(speed[some]), weights[:, some] * force[None, some])
+    force = force - _line(rough, share, speed, side)
+    sums = compress(speed, side, jnp.stack([weight, weight * force]), panels)
+    places, few, loads = nodes(panels), sums[:, 0], sums[:, 1]
+    lines = orthonormal_lines(places, few)
+    values = lines(places)
+    share = _shares(values, loads)
+    force = force - _line(lines, share, speed, side)
+    along = values * few[:, None, :]
+    loads = loads - jnp.sum(share[:, :, None] * along, axis=1)
+    against = jnp.concatenate([along, loads[:, None, :]], axis=1)
+    total = jnp.sum(few, axis=0)
+    shared = orthonormal_lines(places, total[None])(places)[0].T
+    moments = Moments(shared, total[:, None] * shared, against, few, weights @ force**2)
+    return moments, Straightened(speed, side, weight, force, lines)
 
 
-def _from_polynomials():
-    """Lagrange polynomials at the Chebyshev points as sums of Chebyshev polynomials, `(K, M)`."""
-    matrix = np.cos(np.arange(ORDER)[:, None] * np.arccos(_points())[None, :]) * 2 / ORDER
-    matrix[0] /= 2
-    return matrix
+def _shares(lines, loads):
+    """The best combination of two orthonormal functions for weighted values, `(2, 2)`."""
+    return jnp.sum(lines * loads[:, None, :], axis=2)
 
 
-def _polynomials(place):
-    """Chebyshev polynomials at places in [−1, 1], `(n, ORDER)`, by their recurrence."""
+def _line(lines: Lines, shares, speed, side):
+    """The value of a combination of lines at each sample, by its direction."""
+    first, second = lines.of(speed, side)
+    share = _of(side, shares)
+    return share[0] * first + share[1] * second
+
+
+def _of(side, pair):
+    """Of values for both directions those of each sample's direction, one array for each."""
+    low, high = pair
+    second = jnp.expand_dims(side == 1, tuple(range(low.ndim)))
+    return jnp.where(second, high[..., None], low[..., None])
+
+
+def _points(order=ORDER):
+    """The Chebyshev points of that order in [−1, 1]."""
+    return np.cos(np.pi * (np.arange(order) + 0.5) / order)
+
+
+@cache
+def _from_pieces():
+    """Lagrange polynomials of a panel as sums of few Chebyshev polynomials on each piece.
+
+    `(PIECES, PIECE_ORDER, ORDER)`: by the discrete cosine transform, which is exact, and cut off.
+    """
+
+    def transform(order):
+        matrix = np.cos(np.arange(order)[:, None] * np.arccos(_points(order))) * 2 / order
+        matrix[0] /= 2
+        return matrix  # from values at the Chebyshev points to coefficients
+
+    middles = (2 * np.arange(PIECES) + 1) / PIECES - 1
+    places = middles[:, None] + _points() / PIECES
+    values = np.cos(np.arange(ORDER) * np.arccos(places)[..., None]) @ transform(ORDER)
+    return np.einsum("ln,inm->ilm", transform(ORDER)[:PIECE_ORDER], values)
+
+
+def _polynomials(place, order):
+    """Chebyshev polynomials at places in [−1, 1], `(n, order)`, by their recurrence."""
     values = [jnp.ones_like(place), place]
-    while len(values) < ORDER:
+    while len(values) < order:
         values.append(2 * place * values[-1] - values[-2])
     return jnp.stack(values, axis=1)

@@ -145,12 +145,26 @@ class Moments(eqx.Module):
         products = self.against.reshape(height * length, -1) @ left.T
         products = products.reshape(height, length, count)
         size = jnp.stack([jnp.sum(w[None, :] * left * left, axis=1) for w in self.weights])
-        rest = size - jnp.sum(products[:, :-1] ** 2, axis=1)
-        # A bump inside the span leaves rounding of itself; its share of the cost is noise.
         most = jnp.sum(self.weights, axis=1)[:, None] * jnp.max(some**2, axis=1)[None, :]
-        eps = 1e3 * jnp.finfo(rest.dtype).eps
-        visible = (rest > eps * size) & (rest > eps**2 * most)
-        return jnp.where(visible, products[:, -1] ** 2 / jnp.where(visible, rest, 1.0), 0.0)
+        inside = jnp.sum(products[:, :-1] ** 2, axis=1)
+        return taken_off(products[:, -1], size, inside, most)
+
+
+def taken_off(
+    along: Float[Array, "*n"],
+    size: Float[Array, "*n"],
+    inside: Float[Array, "*n"],
+    most: Float[Array, "*n"],
+) -> Float[Array, "*n"]:
+    """What a column takes off the cost: (r·e)²/(e·e − |Qᵀe|²), N²·s.
+
+    A column inside the span of Q leaves rounding of itself, and takes nothing off: rounding beside
+    e·e, `size`, and beside `most`, the square before what was common went.
+    """
+    rest = size - inside
+    eps = 1e3 * jnp.finfo(rest.dtype).eps
+    visible = (rest > eps * size) & (rest > eps**2 * most)
+    return jnp.where(visible, along**2 / jnp.where(visible, rest, 1.0), 0.0)
 
 
 def moments(

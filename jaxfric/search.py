@@ -61,29 +61,30 @@ def search(
 class _Best(NamedTuple):
     """The best grid point and the cell around it, in the unit cube.
 
-    `sides`, where each direction is one bump's own problem, and `samples`, the same on the samples
-    where `sides` stands on nodes instead.
+    `sides`, where each direction is one bump's own problem, and `samples`, where `sides` stands on
+    nodes instead of these.
     """
 
     start: Float[Array, " d"]
     cell: Float[Array, " d"]
     sides: "_Sides | None" = None
-    samples: "_Sides | None" = None
+    samples: compress.Straightened | None = None
 
 
 class _Sides(NamedTuple):
-    """One bump's values at the places of the moments, as a function of β, and each direction's
+    """One bump as a function of β and places, the places of the moments, and each direction's
     bounds of β, `(2, 2, d)`.
     """
 
-    bump: Callable[[Float[Array, " d"]], Float[Array, " J"]]
+    bump: Callable[[Float[Array, " d"], Float[Array, " J"]], Float[Array, " J"]]
+    places: Float[Array, " J"]
     moments: reduced.Moments
     boxes: Float[Array, "2 2 d"]
     logarithmic: tuple[bool, ...]
 
     def at(self, unit: Float[Array, " d"], box: Float[Array, "2 d"]) -> Float[Array, " J"]:
         """The bump at a point of one direction's unit cube."""
-        return self.bump(reduced.decode(unit, box, self.logarithmic))
+        return self.bump(reduced.decode(unit, box, self.logarithmic), self.places)
 
     def costs(self, grid: Float[Array, "G d"]) -> Float[Array, "2 G"]:
         """The cost of each direction over its own bounds."""
@@ -100,6 +101,25 @@ class _Sides(NamedTuple):
             return rows.gains(jax.vmap(lambda unit: self.at(unit, box))(points))[0]
 
         return reduced.each(side, self.moments, self.boxes, units)
+
+    def check(self, units: Float[Array, "2 k d"], samples: compress.Straightened):
+        """The gains on the samples that the places stand for, `(2, k)`."""
+
+        def decoded(units, box):
+            return jax.vmap(lambda unit: reduced.decode(unit, box, self.logarithmic))(units)
+
+        betas = jax.vmap(decoded)(units, self.boxes)
+        values = jax.vmap(jax.vmap(self.bump, (0, None)), (0, None))(betas, self.places)
+        shares = jnp.einsum("dim,dkm->dik", self.moments.against[:, :2], values)
+
+        def bumps(speed, side):
+            def one(low, high):
+                beta = jnp.where(side[:, None] == 1, high[None, :], low[None, :])
+                return jax.vmap(self.bump)(beta, speed)
+
+            return jax.vmap(one)(*betas)
+
+        return samples.gains(bumps, shares)
 
     def refined(self, start: Float[Array, "2 d"], cell: Float[Array, "2 d"]):
         """The minimiser of each direction near its start, `(2, d)`, and which converged."""
@@ -166,11 +186,12 @@ def _refine(problem: _Problem, best: _Best):
     start = best.start.reshape(2, -1)
     unit, converged = best.sides.refined(start, best.cell.reshape(2, -1))
     if best.samples is not None:
-        before, after = best.samples.gains(jnp.stack([start, unit], axis=1)).T
+        both = jnp.stack([start, unit], axis=1)
+        before, after = best.sides.check(both, best.samples).T
         fine = after >= before * (1 - 64 * jnp.finfo(unit.dtype).eps)
         # Nodes that are off by half the digits do not stand for these samples.
-        off = jnp.abs(best.sides.gains(unit[:, None])[:, 0] - after)
-        true = off <= jnp.finfo(unit.dtype).eps ** 0.5 * best.samples.moments.whole
+        off = jnp.abs(best.sides.gains(both)[:, 1] - after)
+        true = off <= jnp.finfo(unit.dtype).eps ** 0.5 * best.sides.moments.whole
         unit, converged = jnp.where(fine[:, None], unit, start), converged & fine & true
     return unit.reshape(-1), jnp.all(converged)
 
@@ -238,10 +259,11 @@ def _grid_sides(sides, problem: _Problem, points):
     else:
         moments = reduced.moments(columns, target, roots)
 
-        def values(beta):
+        def values(beta, _):
             return rows.columns(bumps.with_beta(beta), recording)[:, 0]
 
-        costs = _Sides(values, moments, problem.boxes, problem.logarithmic[:count]).costs(grid)
+        logarithmic = problem.logarithmic[:count]
+        costs = _Sides(values, rows.time, moments, problem.boxes, logarithmic).costs(grid)
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
     return _Best(starts.reshape(-1), cells.reshape(-1), *(() if shared else exact))
@@ -259,22 +281,28 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
     slowest = jnp.min(jnp.where(used, speed, jnp.inf))
     slowest = jnp.where(jnp.isfinite(slowest), slowest, 1.0)
     speed = jnp.where(used, speed, slowest)
-    moments = reduced.moments(columns, target, roots, jnp.sign(velocity))
-    straight = all(isinstance(t, Coulomb | Viscous) for term in linear for t in summands(term))
+    sign = jnp.sign(velocity)
 
-    def sides(speed, moments):
-        def contrast(beta):
-            return bump.with_beta(beta).contrast(speed, slowest)
+    def contrast(beta, speed):
+        return bump.with_beta(beta).contrast(speed, slowest)
 
-        return _Sides(contrast, moments, problem.boxes, problem.logarithmic[: grid.shape[1]])
+    def sides(places, moments):
+        logarithmic = problem.logarithmic[: grid.shape[1]]
+        return _Sides(contrast, places, moments, problem.boxes, logarithmic)
 
-    here, samples = sides(speed, moments), None
-    if straight and grid.shape[0] >= compress.LEAST_POINTS:
+    if _straight(linear) and grid.shape[0] >= compress.LEAST_POINTS:
         # The first nonlinear parameter of a bump is its width.
         panels = compress.edges(slowest, jnp.max(speed), jnp.min(problem.boxes[:, 0, 0]))
-        nodes = compress.compressed(moments, speed, panels)
-        here, samples = sides(compress.nodes(panels), nodes), here
+        moments, samples = compress.compressed(speed, sign * target, roots**2, panels)
+        here = sides(compress.nodes(panels), moments)
+    else:
+        here, samples = sides(speed, reduced.moments(columns, target, roots, sign)), None
     return here.costs(grid), here, samples
+
+
+def _straight(linear) -> bool:
+    """Whether the columns without β are Coulomb and viscous friction, a straight line of speed."""
+    return {type(t) for term in linear for t in summands(term)} == {Coulomb, Viscous}
 
 
 def _general_sides(problem, bumps, grid, columns, target, roots):

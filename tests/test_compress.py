@@ -31,6 +31,12 @@ def rows(speed, sign, force, weight):
     return MOMENTS(*map(jnp.asarray, (columns, force, roots, sign)))
 
 
+def along(speed, sign, force, weight):
+    """Speeds, forces along the motion, and the weights of both directions."""
+    weights = np.stack([weight * (sign > 0), weight * (sign < 0)])
+    return map(jnp.asarray, (speed, sign * force, weights))
+
+
 def shape(kind, speed, beta):
     """The bumps in extended precision, written apart from the library."""
     if kind is Gaussian:
@@ -94,7 +100,7 @@ def test_nodes_stand_for_samples(kind, count, low, narrowest):
     moments, speed = rows(*data), jnp.asarray(data[0])
     slowest = jnp.min(speed)
     panels = compress.edges(slowest, jnp.max(speed), jnp.asarray(narrowest))
-    few, places = COMPRESSED(moments, speed, panels), compress.nodes(panels)
+    (few, _), places = COMPRESSED(*along(*data), panels), compress.nodes(panels)
 
     def costs(at, moments, beta):
         bump = kind().with_beta(beta)
@@ -113,11 +119,12 @@ def test_samples_without_weight_do_not_matter():
     speed, sign, force, weight = sample(2000, 1e-3, 0.1, 0.0)
     panels = compress.edges(*map(jnp.asarray, (1e-3, 0.1, 1e-3)))
     values = jnp.asarray(np.stack([weight, weight * force]))
+    side = jnp.asarray((sign < 0).astype(np.int32))
     more = jnp.concatenate([jnp.asarray(speed), jnp.asarray([0.0, 5.0])])
     padded = jnp.pad(values, ((0, 0), (0, 2)))
     np.testing.assert_allclose(
-        compress.compress(jnp.asarray(speed), values, panels),
-        compress.compress(more, padded, panels),
+        compress.compress(jnp.asarray(speed), side, values, panels),
+        compress.compress(more, jnp.pad(side, (0, 2)), padded, panels),
         rtol=1e-12,
         atol=1e-12,
     )

@@ -110,10 +110,10 @@ def test_one_direction_alone():
 
 
 def test_nodes_that_lie_are_found_out(monkeypatch):
-    def lying(rows, speed, panels):
-        true = honest(rows, speed, panels)
+    def lying(*data):
+        true, samples = honest(*data)
         against = true.against[..., ::-1]
-        return type(true)(true.shared, true.dual, against, true.weights, true.whole)
+        return type(true)(true.shared, true.dual, against, true.weights, true.whole), samples
 
     honest = compress.compressed
     monkeypatch.setattr(compress, "compressed", lying)
