@@ -39,8 +39,8 @@ baseline is fitted, each direction of motion with its own parameters.
   answer is judged by its difference to that one. A finding that was there before (the same effect,
   and the same place where it has one, within 2 % or two standard errors) is not counted, nor is one
   that is declared confusable with an own one that is not named again, unless it is the planted one;
-  what else is new and was not planted is false. A place counts as found if it was not there before, or if its structure
-  has grown by half of the planted force's power.
+  what else is new and was not planted is false. A place counts as found if it was not there before,
+  or if its structure has grown by half of the planted force's power.
 - *Before* is the held-out error freed of what the machine's own findings remove, in squares; the
   *oracle* has the planted force taken away and its own findings kept.
 - An effect that the recording has already, planted once more, cannot be told from its own unless
@@ -48,8 +48,8 @@ baseline is fitted, each direction of motion with its own parameters.
 - The rest is as in the report of `jaxfric prove`."""
 
 AGAIN = """\
-The same command plants the same forces; the truth of each case is in `sealed/`, what `explain` said,
-its own findings included, in `answers/`."""
+The same command plants the same forces; the truth of each case is in `sealed/`, what `explain`
+said, the machine's own findings included, in `answers/`."""
 
 
 def main() -> None:

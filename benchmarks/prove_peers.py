@@ -1,43 +1,51 @@
 """What simpler methods make of the cases of `jaxfric prove`, on the same rows.
 
     jaxfric prove --cases 240 --seed 1 --out proof
+    pip install "jaxfric[peers]"
     python benchmarks/prove_peers.py proof
 
 - *stepwise*: forward selection by BIC out of a library of polynomials and Fourier terms in
   position, velocity and time. The number of observations is that of rows that share no samples.
 - *stlsq*: sequentially thresholded least squares over the same library, as in SINDy (Brunton,
   Proctor & Kutz 2016), columns and residual scaled to unit mean square, threshold 0.1.
+- *pysindy*: the same library in the package pysindy: STLSQ with its default ridge, bagged.
 - *raw ranking*: the term of jaxfric's own library with the largest R², without any correction for
   chance. It always names something.
+- *boosted trees*, *Gaussian process* (scikit-learn): predict what the baseline leaves from
+  position, velocity, acceleration, time, direction and predicted force, and name nothing.
 
-The first two name columns, not physics. They are given the benefit of every doubt: a column counts
-as naming any effect that it could stand for, and the largest one as the one named first.
+Those that select name columns, not physics. They are given the benefit of every doubt: a column
+counts as naming any effect that it could stand for, and the largest one as the one named first.
+All are judged on the held-out recording beside `explain` and the oracle of the proof.
 """
 
 import argparse
 import dataclasses
+import importlib.util
 import json
 import os
+import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
+import peer_methods as methods
 
 from jaxfric import concealed, models
 from jaxfric.cli import _configure
+from jaxfric.explanation import verification
 from jaxfric.explanation.candidates import Field
 from jaxfric.explanation.contest import contest
-from jaxfric.explanation.evidence import NODES
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.question import ask
-from jaxfric.proof.counting import rate
+from jaxfric.io import write_text
+from jaxfric.proof.counting import middle, rate
 from jaxfric.proof.planning import PATTERN
+from jaxfric.proof.scoring import LEAST_REDUCTION
 from jaxfric.proof.writing import share, table
 
 HARMONICS = 20
-MOST = 30
-THRESHOLD = 0.1
 # What a column of each family could stand for.
 FAMILIES = {
     "curve": ("viscous_nonlinearity", "stribeck", "frictional_lag", "presliding"),
@@ -49,7 +57,7 @@ FAMILIES = {
     "tone": ("periodic_disturbance", "disturbance_pulses", "cross_axis"),
     "warming": ("thermal_drift", "friction_step"),
 }
-METHODS = ("stepwise", "stlsq", "raw ranking")
+RANKING = "raw ranking"
 
 
 def library(evidence, low, stroke, start, duration):
@@ -70,47 +78,32 @@ def library(evidence, low, stroke, start, duration):
     return [name for name, _ in found], evidence.project(np.array([c for _, c in found])).T
 
 
-def stepwise(base, columns, target):
-    """Numbers of the columns that BIC selects one after the other, behind the baseline's."""
-    count = len(target) * 3 / (2 * NODES)  # every third node has a row of 2 NODES of them
-    basis = np.linalg.qr(base)[0]
-    rest, left = columns - basis @ (basis.T @ columns), target - basis @ (basis.T @ target)
-    size, taken = np.linalg.norm(rest, axis=0), []
-    for _ in range(MOST):
-        norm = np.linalg.norm(rest, axis=0)
-        # What the columns before leave of it is rounding.
-        gain = np.where(norm > 1e-6 * size, left @ rest / np.maximum(norm, 1e-300), 0.0)
-        best, energy = int(np.argmax(np.abs(gain))), left @ left
-        if -count * np.log1p(-min(gain[best] ** 2 / energy, 1 - 1e-12)) < np.log(count):
-            break
-        taken.append(best)
-        unit = rest[:, best] / norm[best]
-        left, rest = left - unit * gain[best], rest - np.outer(unit, unit @ rest)
-    return taken
+def there():
+    """The methods whose packages are installed."""
+    found = [*methods.SELECTING, RANKING, *methods.PREDICTING]
+    return [m for m in found if importlib.util.find_spec(methods.NEEDS.get(m, "numpy")) is not None]
 
 
-def stlsq(base, columns, target):
-    """Numbers of the columns whose coefficients stay over the threshold."""
-    basis = np.linalg.qr(base)[0]
-    rest, left = columns - basis @ (basis.T @ columns), target - basis @ (basis.T @ target)
-    scale = np.maximum(np.linalg.norm(rest, axis=0), 1e-300) / np.linalg.norm(left)
-    kept = np.arange(columns.shape[1])
-    while kept.size:
-        weights = np.linalg.lstsq(rest[:, kept] / scale[kept], left, rcond=None)[0]
-        large = np.abs(weights) > THRESHOLD
-        if large.all():
-            return kept[np.argsort(-np.abs(weights))].tolist()
-        kept = kept[large]
-    return []
-
-
-def judge(sealed):
+def judge(sealed, wanted):
     """What each method says of one case: effects it could mean, the first first; errors."""
     machine = concealed.draw(sealed["seed"], sealed["effects"], tuple(sealed["size"]))
     run = concealed.record(machine)
     structure = models.named(machine.baseline)
     recording, holdout = (dataclasses.replace(r, source="") for r in (run.recording, run.holdout))
     asked = ask(recording, holdout, structure)
+    found = {}
+    if set(wanted) & set(methods.SELECTING):
+        found |= select(asked, recording, [m for m in wanted if m in methods.SELECTING])
+    if RANKING in wanted:
+        seen = with_predictions(asked.evidence, asked.base)
+        trials = contest(seen, asked.base, Field(seen, structure)).trials
+        best = max(trials, key=lambda trial: trial.gain).candidate.effect.name
+        found[RANKING] = {"named": [[best]], "after": None}
+    return found | predict(asked, [m for m in wanted if m in methods.PREDICTING])
+
+
+def select(asked, recording, wanted):
+    """What the methods that select columns take, and what a refit with it leaves when held out."""
     x, t = np.asarray(recording.position), np.asarray(recording.time)
     scales = x.min(), np.ptp(x), t[0], np.ptp(t)
     views = asked.evidence, asked.held
@@ -126,37 +119,86 @@ def judge(sealed):
     ]
     (families, columns), (_, held) = (library(view, *scales) for view in views)
     found = {}
-    for name, method in (("stepwise", stepwise), ("stlsq", stlsq)):
-        taken = method(bases[0], columns, views[0].target)
+    for name in wanted:
+        taken = methods.SELECTING[name](bases[0], columns, views[0].target)
         design = np.hstack([bases[0], columns[:, taken]])
         weights = np.linalg.lstsq(design, views[0].target, rcond=None)[0]
         left = views[1].target - np.hstack([bases[1], held[:, taken]]) @ weights
-        error = float(np.linalg.norm(left) / np.linalg.norm(views[1].target))
-        found[name] = {"named": [FAMILIES[families[i]] for i in taken], "after": error}
-    seen = with_predictions(asked.evidence, asked.base)
-    trials = contest(seen, asked.base, Field(seen, structure)).trials
-    best = max(trials, key=lambda trial: trial.gain).candidate.effect.name
-    found["raw ranking"] = {"named": [[best]], "after": None}
+        found[name] = {
+            "named": [FAMILIES[families[i]] for i in taken], "after": relative(left, views[1])
+        }  # fmt: skip
     return found
 
 
-def rows(cases):
-    """The table: each method's rates over the cases; those of jaxfric are in the proof's report."""
+def predict(asked, wanted):
+    """What the methods that name nothing leave when held out."""
+    lefts = [verification.residual(asked.base, view) for view in (asked.evidence, asked.held)]
+    seen, held = (
+        methods.signals(view, view.target - left)
+        for view, left in zip((asked.evidence, asked.held), lefts, strict=True)
+    )
+    found = {}
+    for name in wanted:
+        rest = lefts[1] - methods.PREDICTING[name](seen, lefts[0], held)
+        found[name] = {"named": None, "after": relative(rest, asked.held)}
+    return found
+
+
+def relative(left, view) -> float:
+    """norm(left)/norm(force) over the held-out rows."""
+    return float(np.linalg.norm(left) / np.linalg.norm(view.target))
+
+
+def rows(cases, wanted):
+    """The table: each method's rates over the cases, and those of `explain` in the same measure."""
     kinds = {kind: [c for c in cases if c["kind"] == kind] for kind in ("healthy", "single")}
-    for method in METHODS:
+    for method in ("explain", *wanted):
 
         def said(case, method=method):
-            return case["peers"][method]["named"]
+            return case["said"][method]["named"]
 
-        first = rate(kinds["single"], lambda c, s=said: bool(s(c)) and c["effects"][0] in s(c)[0])
-        some = rate(
-            kinds["single"], lambda c, s=said: any(c["effects"][0] in names for names in s(c))
-        )
-        silent = rate(kinds["healthy"], lambda c, s=said: not s(c))
-        count = np.median([len(said(c)) for c in kinds["single"]]) if kinds["single"] else 0
-        errors = [c["peers"][method]["after"] for c in kinds["single"]]
-        error = "-" if not errors or None in errors else f"{np.median(errors):.2%}"
-        yield method, share(silent), share(first), share(some), f"{count:g}", error
+        named = any(said(c) is not None for c in cases)
+        cells = ["-"] * 4
+        if named:
+            first = rate(
+                kinds["single"], lambda c, s=said: bool(s(c)) and c["effects"][0] in s(c)[0]
+            )
+            some = rate(
+                kinds["single"], lambda c, s=said: any(c["effects"][0] in names for names in s(c))
+            )
+            count = np.median([len(said(c)) for c in kinds["single"]]) if kinds["single"] else 0
+            alarms = rate(kinds["healthy"], lambda c, s=said: bool(s(c)))
+            cells = [share(alarms), share(first), share(some), f"{count:g}"]
+        errors = [c["said"][method]["after"] for c in kinds["single"]]
+        error, part = middle(errors), middle(reached(c, method) for c in kinds["single"])
+        worse = rate(kinds["healthy"], lambda c, m=method: worsened(c, m))
+        yield (
+            method, *cells, "-" if error is None else f"{error:.2%}",
+            "-" if part is None else f"{part:.1%}", share(worse),
+        )  # fmt: skip
+
+
+def reached(case, method) -> float | None:
+    """Part of the oracle's reduction of the held-out error, as in the proof's report."""
+    before, oracle, after = case["before"], case["oracle"], case["said"][method]["after"]
+    if None in (before, oracle, after) or before - oracle < LEAST_REDUCTION * before:
+        return None
+    return (before - after) / (before - oracle)
+
+
+def worsened(case, method) -> bool | None:
+    """Whether the held-out error of a healthy machine has grown by a hundredth or more."""
+    after = case["said"][method]["after"]
+    return None if None in (after, case["before"]) else after > 1.01 * case["before"]
+
+
+def explained(answer):
+    """What `explain` said, in the form of the others; `None` where it has no answer."""
+    if answer["error"] is not None:
+        return None
+    held = answer["fit"]["holdout_force_error"]
+    named = [[finding["effect"]] for finding in answer["findings"]]
+    return {"named": named, "after": held["after"]}
 
 
 def main() -> None:
@@ -165,24 +207,48 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="of a proof that has been run")
     parser.add_argument("--cases", type=int, default=None, help="only so many, the first ones")
     arguments = parser.parse_args()
+    wanted = there()
+    lacking = sorted({*methods.SELECTING, *methods.PREDICTING} - {*wanted})
+    if lacking:
+        print(f'{", ".join(lacking)} left out: pip install "jaxfric[peers]"', file=sys.stderr)
     _configure()
-    out, cases = arguments.folder / "peers", []
-    out.mkdir(exist_ok=True)
+    cases = []
     for file in sorted((arguments.folder / "sealed").glob("*.json"))[: arguments.cases]:
-        case = json.loads(file.read_text(encoding="utf-8"))
-        there = out / file.name
-        if not there.is_file():
-            there.write_text(json.dumps(judge(case)), encoding="utf-8")
-        cases.append(case | {"peers": json.loads(there.read_text(encoding="utf-8"))})
-    head = ("", "healthy: silent", "one effect: largest column could mean it",
-            "any column could", "columns, median", "held-out error, median")  # fmt: skip
-    text = table(head, rows(cases))
-    (arguments.folder / "peers.md").write_text(
+        case = collected(arguments.folder, file, wanted)
+        if case is not None:
+            cases.append(case)
+    head = ("", "healthy: something named", "one effect: largest column could mean it",
+            "any column could", "columns, median", "held-out error, median",
+            "part of the oracle's reduction, median",
+            "healthy: held-out error 1 % worse")  # fmt: skip
+    text = table(head, rows(cases, wanted))
+    write_text(
+        arguments.folder / "peers.md",
         f"# Simpler methods on {len(cases)} cases (of every {len(PATTERN)}, 8 healthy, 12 single)"
         f"\n\n{text}\n",
-        encoding="utf-8",
     )
     print(text)
+
+
+def collected(folder, file, wanted):
+    """A case with what each method said of it, asked now where it has not been; `None` where
+    `explain` has no answer.
+    """
+    case = json.loads(file.read_text(encoding="utf-8"))
+    answer = json.loads((folder / "answers" / file.name).read_text(encoding="utf-8"))
+    ours = explained(answer)
+    if ours is None:
+        return None
+    kept = folder / "peers" / file.name
+    kept.parent.mkdir(exist_ok=True)
+    said = json.loads(kept.read_text(encoding="utf-8")) if kept.is_file() else {}
+    open_ = [method for method in wanted if method not in said]
+    if open_:
+        said |= judge(case, open_)
+        write_text(kept, json.dumps(said))
+    before = answer["fit"]["holdout_force_error"]["before"]
+    measures = {"before": before, "oracle": answer["oracle"]}
+    return case | measures | {"said": said | {"explain": ours}}
 
 
 if __name__ == "__main__":

@@ -59,7 +59,8 @@ def report(
     """The report of scored cases, made by a command.
 
     **Arguments:** `pictures`: files beside the report; `title`, and `method`: how the cases were
-    made and judged; `again`: how one is made again; `more`: further parts, before the cases that were missed.
+    made and judged; `again`: how one is made again; `more`: further parts, before the cases that
+    were missed.
     """
     parts = [
         f"# {title}: {len(scores)} cases",
