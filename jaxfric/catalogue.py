@@ -230,10 +230,10 @@ CATALOGUE = (
     ),
     Effect(
         "compliance",
-        "M_L r̈, r̈ + 2ζω ṙ + ω² r = −a",
+        "M_L r̈, r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v)",
         ("acceleration", "time_since_reversal"),
         ("transport_delay", "actuator_lag", "backlash"),
-        _fixed(laws.Compliance()),
+        _fixed(*(laws.Compliance(driven=by) for by in ("inertia", "friction", "both"))),
         frozenset(),
         False,
         "Excite with a sweep up to the resonance, or measure on the load side.",

@@ -47,8 +47,8 @@ _TEXTS = {
     "frictional_lag": "Friction follows velocity {frictional_lag} late",
     "backlash": "After a reversal {backlash_force} of friction is absent while a gap of twice "
     "{half_gap} is crossed: backlash",
-    "compliance": "A load of {load_inertia} swings on the drive at {load_resonance} against a held "
-    "motor, damping ratio {damping_ratio}: compliance",
+    "compliance": "The load swings on the drive, at {load_resonance} against a held motor, with a "
+    "damping ratio of {damping_ratio}: compliance",
     "transport_delay": "The force acts {delay} late: a dead time between command and motion",
     "actuator_lag": "The force lags its command by a time constant of {lag}",
     "actuator_deadband": "{deadband} of command is lost around zero force: a dead-band",

@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -68,37 +69,60 @@ def _damping_bounds(scales):
     return 0.01, 0.7
 
 
-class Compliance(AbstractMemory):
-    """Load on a spring and a damper, position on the motor: u = f + M_L (a_L − a).
+# A speed below this part of the root mean square is rest or the noise of it, and no direction.
+_REST = 0.03
 
-    With r = x_L − x: r̈ + 2ζω ṙ + ω² r = −a, and M_L (a_L − a) = d(M_L ṙ)/dt. `load_inertia` M_L,
-    kg; `load_resonance` ω/2π, Hz, at which the load swings against a held motor;
-    `damping_ratio` ζ. The oscillator is exact for a velocity that is straight between the samples;
-    friction acts on the motor. A segment starts with the load at rest on its spring.
+
+class Compliance(AbstractMemory):
+    """Load on a spring and a damper, position on the motor: u = f + M_L r̈.
+
+    With r = x_L − x: r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v). `load_inertia` M_L, kg;
+    `load_friction` F_L, N, the part of the friction that acts on the load and so reaches the motor
+    by the spring; `load_resonance` ω/2π, Hz, at which the load swings against a held motor;
+    `damping_ratio` ζ. What excites it, `driven`, is "inertia", "friction" or "both"; what does
+    not is left out. The oscillator is exact for a velocity that is straight between the samples;
+    to first order, the load goes the way of the motor. A segment starts with the load at rest on
+    its spring.
     """
 
     load_resonance: Float[Array, ""] | float = UNKNOWN
     damping_ratio: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = (Parameter("load_inertia", INERTIA),)
+    driven: str = eqx.field(static=True, default="inertia")
     nonlinear: ClassVar = (
         Parameter("load_resonance", FREQUENCY, _resonance_bounds),
         Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds),
     )
 
+    def __check_init__(self):
+        if self.driven not in _DRIVES:
+            raise ValueError(f"driven is one of {', '.join(_DRIVES)}, not {self.driven!r}.")
+
+    @property
+    def affine(self):
+        return _DRIVES[self.driven]
+
     @property
     def inertial(self) -> bool:
         return True
 
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        return jnp.zeros((recording.num_samples, 1), recording.time.dtype)
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
 
-    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
-        begins = starts(recording)
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
         span = jnp.pad(jnp.diff(recording.time), (1, 0))
-        pull = jnp.pad(jnp.diff(recording.velocity), (1, 0))
-        real = ~begins & (span > 0)
+        real = ~starts(recording) & (span > 0)
         span = jnp.where(real, span, 1.0)
-        pull = jnp.where(real, pull / span, 0.0)
+        speed = recording.velocity
+        rate = jnp.pad(jnp.diff(speed), (1, 0)) / span
+        mean = 0.5 * (speed + jnp.roll(speed, 1))
+        rest = _REST * jnp.sqrt(jnp.mean(speed**2)) + jnp.finfo(speed.dtype).tiny
+        pulls = {_LOAD_INERTIA: jnp.where(real, rate, 0.0)}
+        pulls[_LOAD_FRICTION] = jnp.clip(jnp.where(real, mean, speed) / rest, -1.0, 1.0)
+        pull = jnp.stack([pulls[parameter] for parameter in self.affine], axis=1)
+        return self._swinging(pull, span, real)
+
+    def _swinging(self, pull, span, real):
+        """ṙ, m/s, of each column of `pull`, m/s² `(N, p)`, over the span before each sample."""
         omega = 2 * jnp.pi * self.load_resonance
         decay = self.damping_ratio * omega
         swing = omega * jnp.sqrt(1 - self.damping_ratio**2)
@@ -109,14 +133,24 @@ class Compliance(AbstractMemory):
 
         def step(state, now):
             stretch, rate = state
-            cosine, sine, sunk, begin = now
-            # Free vibration about where the acceleration would hold the spring.
+            cosine, sine, sunk, real = now
+            # Free vibration about where the pull would hold the spring.
             away = stretch + sunk
             stretch = away * (cosine + decay * sine) + rate * sine - sunk
             rate = rate * (cosine - decay * sine) - away * omega**2 * sine
-            state = jnp.where(begin, 0.0, stretch), jnp.where(begin, 0.0, rate)
+            state = jnp.where(real, stretch, -sunk), jnp.where(real, rate, 0.0)
             return state, state[1]
 
-        rest = jnp.zeros_like(recording.velocity[0])
-        along = (cosine, sine, sunk, ~real)
-        return jax.lax.scan(step, (rest, rest), along, unroll=4)[1][:, None]
+        rest = jnp.zeros_like(sunk[0])
+        return jax.lax.scan(step, (rest, rest), (cosine, sine, sunk, real), unroll=4)[1]
+
+
+_LOAD_INERTIA, _LOAD_FRICTION = (
+    Parameter("load_inertia", INERTIA),
+    Parameter("load_friction", FORCE),
+)
+_DRIVES = {
+    "inertia": (_LOAD_INERTIA,),
+    "friction": (_LOAD_FRICTION,),
+    "both": (_LOAD_INERTIA, _LOAD_FRICTION),
+}
