@@ -52,3 +52,28 @@ def invert_upper(matrix: Float[Array, "p p"]) -> Float[Array, "p p"]:
 
     places = jnp.eye(matrix.shape[0], dtype=matrix.dtype)
     return jax.lax.scan(add, jnp.zeros_like(matrix), (matrix, places), reverse=True)[0]
+
+
+def whiten(gram: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, ""]]:
+    """Upper triangular W with Wᵀ G W = 1, and the least pivot of G scaled to a unit diagonal.
+
+    Gram-Schmidt on the unit vectors with the inner product G. A row and column of zeros stays zero
+    in W and has no pivot; where the pivot is not well above rounding, W means nothing.
+    """
+    diagonal = jnp.diagonal(gram)
+    there = diagonal > 0
+    scale = jnp.where(there, 1 / jnp.sqrt(jnp.where(there, diagonal, 1.0)), 0.0)
+    gram = gram * scale[:, None] * scale[None, :]
+
+    def add(state, place):
+        white, least = state
+        rest = place - white @ (white.T @ (gram @ place))
+        pivot = jnp.vdot(rest, gram @ rest)
+        valid = pivot > 0
+        unit = rest / jnp.sqrt(jnp.where(valid, pivot, 1.0))
+        least = jnp.where(jnp.vdot(place, scale) > 0, jnp.minimum(least, pivot), least)
+        return (white + jnp.where(valid, unit, 0.0)[:, None] * place[None, :], least), None
+
+    start = jnp.zeros_like(gram), jnp.ones((), gram.dtype)
+    (white, least), _ = jax.lax.scan(add, start, jnp.eye(gram.shape[0], dtype=gram.dtype))
+    return scale[:, None] * white, least
