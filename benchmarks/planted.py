@@ -22,7 +22,7 @@ import recordings
 from jaxfric import proof
 from jaxfric.cli import _configure, options
 from jaxfric.io import write_text
-from jaxfric.proof import planting
+from jaxfric.proof import comparing, planting
 from jaxfric.proof.writing import rates, table
 
 METHOD = """\
@@ -62,7 +62,7 @@ def main() -> None:
         folder, logs, sizes, arguments.each, arguments.seed, arguments.jobs, _configure,
         arguments.limit,
     )  # fmt: skip
-    scores = planting.scores(folder, cases)
+    scores = comparing.scores(folder, cases)
     command = (
         f"python benchmarks/planted.py --seed {arguments.seed} --each {arguments.each} "
         f"--sizes {arguments.sizes}"
@@ -72,7 +72,7 @@ def main() -> None:
         by_recording(scores, logs, sizes),
         "## The recordings as they are",
         table(("", "verdict", "findings", "force error before, after"),
-              planting.described(folder, cases)),
+              comparing.described(folder, cases)),
     ]  # fmt: skip
     text = proof.report(
         scores, command, proof.draw(scores, folder), title="Planted effects", method=METHOD,

@@ -8,7 +8,6 @@ findings of its own, though, so each answer is compared with that to the recordi
 import dataclasses
 import functools
 import itertools
-import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -28,7 +27,6 @@ from ..io import read, write_text
 from ..recording import Recording
 from .planning import Case, turns
 from .running import LIMIT, claim, do_all
-from .scoring import Score, score
 from .trials import (
     ANSWERS,
     SEALED,
@@ -38,7 +36,6 @@ from .trials import (
     fingerprint,
     path,
     plain,
-    read as document,
 )
 
 # What is a force of the recorded position, velocity, acceleration and time alone. Asymmetry every
@@ -53,11 +50,6 @@ PLANTED = tuple(
         "periodic_disturbance", "disturbance_pulses",
     }
 )  # fmt: skip
-# Parameters that say where a finding is: two with others are two findings.
-PLACES = ("pitch", "unbalance_period", "friction_period", "inertia_period", "frequency",
-          "spot_position", "stop_position", "lower_stop_position", "step_time")  # fmt: skip
-# Places that differ by less, or by less than twice their standard error, are the same place.
-SAME = 0.02
 
 
 class Log(NamedTuple):
@@ -131,7 +123,8 @@ def trial(case: Case, folder: Path, logs: Mapping[str, Log]) -> None:
         recording, holdout = log.both()
         truth, planted, norm = {}, 0.0, _norm(holdout)
         for name in case.effects:
-            truth[name], forces = plant(recording, holdout, log.baseline, name, case)
+            known = level(recording, log.baseline)
+            truth[name], forces = plant(recording, holdout, known, name, case)
             planted = rms(forces[0])
             recording = _with(recording, forces[0])
             holdout = None if holdout is None else _with(holdout, forces[1])
@@ -152,15 +145,28 @@ def _with(recording: Recording, force: np.ndarray) -> Recording:
     return dataclasses.replace(recording, force=np.asarray(recording.force) + force)
 
 
+def level(recording: Recording, baseline: str) -> tuple[float, float]:
+    """The Coulomb level, N, and the inertia, kg (zero where it is not seen), of a recording."""
+    found = identify(baseline, recording).parameters
+    levels = [float(v.value) for name, v in found.items() if name.startswith("coulomb")]
+    inertia = float(found["inertia"].value) if "inertia" in found else 0.0
+    return float(np.mean(np.abs(levels))), inertia
+
+
 def plant(
-    recording: Recording, holdout: Recording | None, baseline: str, name: str, case: Case
+    recording: Recording,
+    holdout: Recording | None,
+    known: tuple[float, float],
+    name: str,
+    case: Case,
 ) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """The truth of an effect drawn for a recording, and its force along both, N, each `(N,)`."""
-    fit = identify(baseline, recording)
-    levels = [float(v.value) for k, v in fit.parameters.items() if k.startswith("coulomb")]
-    inertia = fit.parameters.get("inertia")
-    coulomb, mass = float(np.mean(np.abs(levels))), 0.0 if inertia is None else inertia.value
-    motion = nominal(recording, coulomb, float(mass))
+    """The truth of an effect drawn for a recording, and its force along both, N, each `(N,)`.
+
+    **Arguments:** `known`: Coulomb level and inertia, as [`level`][] finds them.
+
+    **Raises:** `ValueError` where the recording leaves no room for the effect.
+    """
+    motion = nominal(recording, *known)
     rng = np.random.default_rng((case.seed, zlib.crc32(name.encode())))
     kind = KINDS[name]
     truth = kind.draw(rng, motion, case.size[0])
@@ -170,7 +176,7 @@ def plant(
     if not size > 0:
         raise ValueError(f"this recording has no room for {name}.")
     if holdout is not None:
-        other = nominal(holdout, coulomb, float(mass))
+        other = nominal(holdout, *known)
         forces.append(
             timed({name: truth}, other, 1).load if name in UNREPEATED else kind.force(truth, other)
         )
@@ -192,98 +198,3 @@ def nominal(recording: Recording, coulomb: float, mass: float) -> Nominal:
     physics = {"mass": mass, "kp": 1e9 * coulomb / float(np.ptp(x))}
     a = np.gradient(v, time)
     return Nominal(time, x, v, a, np.asarray(recording.force), way, top, coulomb, physics, shape)
-
-
-def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
-    """Open what was sealed, and score the planted cases against those to the logs as they are."""
-    own: dict[str, dict[str, Any]] = {}
-    found: list[Score] = []
-    for case in cases:
-        if not path(folder, ANSWERS, case).is_file():
-            continue
-        answer = document(path(folder, ANSWERS, case))
-        log = case.name.rpartition("-")[0]
-        if not case.effects:
-            own[log] = answer
-            continue
-        truth = path(folder, SEALED, case)
-        sealed = document(truth) if truth.is_file() else None
-        if answer["error"] is None and own.get(log, {"error": "not there"})["error"] is not None:
-            answer = answer | failed(f"{log} as it is has no answer")
-        elif answer["error"] is None and sealed is not None:
-            answer = difference(answer, own[log], case.effects, sealed["planted"])
-            if UNREPEATED & set(case.effects):
-                answer["oracle"] = None
-        found.append(score(case, sealed, answer))
-    return found
-
-
-def difference(
-    answer: Mapping[str, Any], own: Mapping[str, Any], effects: Sequence[str], planted: float
-) -> dict[str, Any]:
-    """An answer without what the recording shows as it is.
-
-    Findings: those of the same effect at the same place are its own; so are those that are declared
-    confusable with one of its own that is not named again, unless they are what was planted. Where:
-    a place counts if it was not there, or its structure has grown by half of the `planted` force's
-    power, N. Held-out error: that before is freed of what its own findings remove, in squares; the
-    oracle, who knows the planted force, is left with what the recording's own model leaves.
-    """
-    rest = [f for f in answer["findings"] if not any(same(f, known) for known in own["findings"])]
-    gone = {known["effect"] for known in own["findings"]}
-    gone -= {finding["effect"] for finding in answer["findings"]}
-    rest = [f for f in rest if f["effect"] in effects or not gone & set(f["confusable_with"])]
-    before: dict[str, float] = {}
-    for place in own["where"]:
-        name = place["coordinate"]
-        before[name] = max(before.get(name, 0.0), place["size"])
-    where = [
-        place
-        for place in answer["where"]
-        if place["size"] ** 2 - before.get(place["coordinate"], 0.0) ** 2 > 0.5 * planted**2
-        or place["coordinate"] not in before
-    ]
-    return {**answer, "findings": rest, "where": where, **_errors(answer, own)}
-
-
-def same(finding: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
-    """Whether two findings are of one effect, at one place where the effect has one."""
-    if finding["effect"] != known["effect"]:
-        return False
-    for name in PLACES:
-        if name in finding["parameters"] and name in known["parameters"]:
-            here, there = (f["parameters"][name] for f in (finding, known))
-            spread = math.hypot(*(e["standard_error"] or 0.0 for e in (here, there)))
-            apart = abs(here["value"] - there["value"])
-            return apart <= max(SAME * abs(there["value"]), 2 * spread)
-    return True
-
-
-def _errors(answer, own) -> dict[str, Any]:
-    held, alone = (a["fit"]["holdout_force_error"] for a in (answer, own))
-    if held is None or alone is None:
-        return {}
-    before, after = (held[when] * answer["held_norm"] for when in ("before", "after"))
-    first, last = (alone[when] * answer["own_norm"] for when in ("before", "after"))
-    known = math.sqrt(max(before**2 - max(first**2 - last**2, 0.0), last**2))
-    errors = {"before": known / answer["held_norm"], "after": held["after"]}
-    fit = answer["fit"] | {"holdout_force_error": errors}
-    return {"fit": fit, "oracle": last / answer["held_norm"]}
-
-
-def described(folder: Path, cases: Sequence[Case]) -> list[tuple[str, ...]]:
-    """A row for each log as it is: name, verdict, findings with size, held-out error."""
-    rows: list[tuple[str, ...]] = []
-    for case in cases:
-        file = path(folder, ANSWERS, case)
-        if case.effects or not file.is_file():
-            continue
-        answer, log = document(file), case.name.rpartition("-")[0]
-        if answer["error"] is not None:
-            rows.append((log, answer["error"], "-", "-"))
-            continue
-        said = ", ".join(f"{f['effect']} ({f['share']:.0%})" for f in answer["findings"])
-        errors = answer["fit"]["force_error"]
-        change = f"{errors['before']:.2%}, {errors['after']:.2%}"
-        rows.append((log, answer["verdict"], said or "nothing", change))
-    return rows
