@@ -193,20 +193,19 @@ def _cause(code: int | None) -> str:
 
 
 def _serve(pipe: Connection, do, prepare) -> None:
-    """In a process: tasks from the pipe, until it closes or says `None`."""
+    """In a process: tasks from the pipe, until it closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
     if prepare is not None:
         prepare()
     gc.enable()  # which the command line's own preparation leaves to its caller
-    pipe.send(True)
-    while True:
-        try:
-            task = pipe.recv()
-        except EOFError:  # the starter is no more
-            return
-        do(task)
+    try:
         pipe.send(True)
-        _let_go()
+        while True:
+            do(pipe.recv())
+            pipe.send(True)
+            _let_go()
+    except (EOFError, BrokenPipeError):  # the starter is no more
+        return
 
 
 def _let_go() -> None:
