@@ -39,12 +39,11 @@ baseline is fitted, each direction of motion with its own parameters.
   answer is judged by its difference to that one. A finding that was there before (the same effect,
   and the same place where it has one, within 2 % or two standard errors) is not counted, nor is one
   that is declared confusable with an own one that is not named again, unless it is the planted one;
-  what else is new and was not planted is false. A place counts as found if it was not there before,
-  or if its structure has grown by half of the planted force's power.
+  what else is new and was not planted is false. What was planted where the machine has the same of
+  its own counts as found if that has grown by half of what the baseline's residual has, in power.
+  So does a place that has structure of its own.
 - *Before* is the held-out error freed of what the machine's own findings remove, in squares; the
   *oracle* has the planted force taken away and its own findings kept.
-- An effect that the recording has already, planted once more, cannot be told from its own unless
-  it has a place: it counts as missed.
 - The rest is as in the report of `jaxfric prove`."""
 
 AGAIN = """\

@@ -68,7 +68,7 @@ def test_the_force_has_its_size(recording, name):
     truth, (force, held) = planting.plant(recording, recording, LEVEL, name, case)
     assert truth["size"] == pytest.approx(0.1, rel=0.3)
     # Of a spring or a weight the mean is the baseline's offset.
-    size = np.std(force) if planting.KINDS[name].centred else planting.rms(force)
+    size = np.std(force) if planting.KINDS[name].centred else np.sqrt(np.mean(force**2))
     assert size == pytest.approx(truth["size"] * 20, rel=1e-6)
     if name == "disturbance_pulses":  # pushes come at other times
         assert np.max(np.abs(held - force)) > 0.1 * np.max(np.abs(force))
@@ -91,14 +91,17 @@ def test_units_do_not_matter(recording):
 
 def finding(effect, *alike, **parameters):
     values = {k: {"value": v, "standard_error": e} for k, (v, e) in parameters.items()}
-    return {"effect": effect, "confusable_with": list(alike), "parameters": values}
+    told = {"effect": effect, "confusable_with": list(alike), "parameters": values}
+    return told | {"share": 0.5}
 
 
 def said(*findings, where=(), before=0.1, after=0.05):
     return {
         "error": None,
         "verdict": "explained",
-        "where": [{"coordinate": name, "size": size} for name, size in where],
+        "where": [
+            {"coordinate": name, "size": size, "share": share} for name, size, share in where
+        ],
         "findings": list(findings),
         "fit": {"holdout_force_error": {"before": before, "after": after}},
         "oracle": None,
@@ -110,7 +113,7 @@ def said(*findings, where=(), before=0.1, after=0.05):
 
 
 def named(answer, own, *effects):
-    return [f["effect"] for f in comparing.difference(answer, own, effects, 1.0)["findings"]]
+    return [f["effect"] for f in comparing.difference(answer, own, effects)["findings"]]
 
 
 def test_what_was_there_before_is_not_counted():
@@ -130,17 +133,26 @@ def test_an_own_finding_under_another_name_is_not_counted():
 
 
 def test_a_place_counts_where_structure_has_grown():
-    own = said(where=[("position", 2.0)])
-    now = said(where=[("position", 2.02), ("time", 0.1)])
-    grown = comparing.difference(now, own, ("spring",), 1.0)["where"]
+    own = said(where=[("position", 2.0, 1.0)])  # 4 N² in all
+    now = said(where=[("position", 2.5, 0.5), ("time", 0.1, 0.0)])  # 12.5 N²
+    grown = comparing.difference(now, own, ("spring",))["where"]
     assert [place["coordinate"] for place in grown] == ["time"]
-    now = said(where=[("position", 2.2)])
-    assert comparing.difference(now, own, ("spring",), 1.0)["where"]
+    now = said(where=[("position", 3.0, 0.72)])
+    assert comparing.difference(now, own, ("spring",))["where"]
+
+
+def test_the_same_effect_planted_counts_if_it_has_grown():
+    own = said(finding("spring"), where=[("position", 2.0, 1.0)])
+    now = said(finding("spring") | {"share": 0.9}, where=[("position", 3.0, 0.72)])
+    assert named(now, own, "spring") == ["spring"]
+    assert named(now, own, "cogging") == []
+    now["findings"][0]["share"] = 0.4
+    assert named(now, own, "spring") == []
 
 
 def test_the_own_reduction_is_taken_off_the_error():
     own, now = said(before=0.05, after=0.03), said(before=0.13, after=0.04)
-    errors = comparing.difference(now, own, ("spring",), 1.0)
+    errors = comparing.difference(now, own, ("spring",))
     assert errors["fit"]["holdout_force_error"]["before"] == pytest.approx(
         math.sqrt(0.13**2 - 0.05**2 + 0.03**2)
     )
@@ -154,8 +166,7 @@ def test_cases_are_scored_against_the_log_as_it_is(tmp_path):
     own = finding("frictional_lag")
     for c in cases:
         truth = {name: {"size": 0.1} for name in c.effects}
-        sealed = {"truth": truth, "planted": 1.0}
-        trials.path(tmp_path, trials.SEALED, c).write_text(json.dumps(sealed))
+        trials.path(tmp_path, trials.SEALED, c).write_text(json.dumps({"truth": truth}))
         told = said(own, *(finding(name) for name in c.effects))
         trials.path(tmp_path, trials.ANSWERS, c).write_text(json.dumps(told))
     scores = comparing.scores(tmp_path, cases)

@@ -33,7 +33,7 @@ def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
         if answer["error"] is None and own.get(log, {"error": "not there"})["error"] is not None:
             answer = answer | failed(f"{log} as it is has no answer")
         elif answer["error"] is None and sealed is not None:
-            answer = difference(answer, own[log], case.effects, sealed["planted"])
+            answer = difference(answer, own[log], case.effects)
             if UNREPEATED & set(case.effects):
                 answer["oracle"] = None
         found.append(score(case, sealed, answer))
@@ -41,20 +41,35 @@ def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
 
 
 def difference(
-    answer: Mapping[str, Any], own: Mapping[str, Any], effects: Sequence[str], planted: float
+    answer: Mapping[str, Any], own: Mapping[str, Any], effects: Sequence[str]
 ) -> dict[str, Any]:
     """An answer without what the recording shows as it is.
 
-    Findings: those of the same effect at the same place are its own; so are those that are declared
-    confusable with one of its own that is not named again, unless they are what was planted. Where:
-    a place counts if it was not there, or its structure has grown by half of the `planted` force's
-    power, N. Held-out error: that before is freed of what its own findings remove, in squares; the
-    oracle, who knows the planted force, is left with what the recording's own model leaves.
+    Findings: those of the same effect at the same place are its own, unless this effect was planted
+    and its part has grown by half of what the baseline's residual has, in power; so are those that
+    are declared confusable with one of its own that is not named again, unless they are what was
+    planted. Where: a place counts if it was not there, or if its structure has grown by half of
+    what the residual has. Held-out error: that before is freed of what its own findings remove, in
+    squares; the oracle, who knows the planted force, is left with what the recording's own model
+    leaves.
     """
-    rest = [f for f in answer["findings"] if not any(same(f, known) for known in own["findings"])]
+    first, now = _power(own["where"]), _power(answer["where"])
+    half = 0.5 * max(now - first, 0.0)
+
+    def grown(finding, known) -> bool:
+        more = (finding["share"] or 0.0) * now - (known["share"] or 0.0) * first
+        return finding["effect"] in effects and more > half > 0
+
+    def renamed(finding) -> bool:
+        return finding["effect"] not in effects and bool(gone & {*finding["confusable_with"]})
+
     gone = {known["effect"] for known in own["findings"]}
     gone -= {finding["effect"] for finding in answer["findings"]}
-    rest = [f for f in rest if f["effect"] in effects or not gone & set(f["confusable_with"])]
+    rest = [
+        f for f in answer["findings"]
+        if not renamed(f)
+        and not any(same(f, known) and not grown(f, known) for known in own["findings"])
+    ]  # fmt: skip
     before: dict[str, float] = {}
     for place in own["where"]:
         name = place["coordinate"]
@@ -62,10 +77,15 @@ def difference(
     where = [
         place
         for place in answer["where"]
-        if place["size"] ** 2 - before.get(place["coordinate"], 0.0) ** 2 > 0.5 * planted**2
+        if place["size"] ** 2 - before.get(place["coordinate"], 0.0) ** 2 > half
         or place["coordinate"] not in before
     ]
     return {**answer, "findings": rest, "where": where, **_errors(answer, own)}
+
+
+def _power(where: Sequence[Mapping[str, Any]]) -> float:
+    """Mean square of the baseline's residual, of which each place has its share; 0 without any."""
+    return next((p["size"] ** 2 / p["share"] for p in where if p["share"] > 0), 0.0)
 
 
 def same(finding: Mapping[str, Any], known: Mapping[str, Any]) -> bool:

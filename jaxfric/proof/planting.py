@@ -18,7 +18,7 @@ import numpy as np
 from .. import signals
 from ..concealed.kinds import KINDS, NAMES
 from ..concealed.machines import Plan
-from ..concealed.nominal import Nominal, rms
+from ..concealed.nominal import Nominal
 from ..concealed.schedule import columns as timed
 from ..documents import to_json
 from ..explanation.question import from_position
@@ -121,15 +121,14 @@ def trial(case: Case, folder: Path, logs: Mapping[str, Log]) -> None:
     try:
         log = logs[case.name.rpartition("-")[0]]
         recording, holdout = log.both()
-        truth, planted, norm = {}, 0.0, _norm(holdout)
+        truth, norm = {}, _norm(holdout)
         for name in case.effects:
             known = level(recording, log.baseline)
             truth[name], forces = plant(recording, holdout, known, name, case)
-            planted = rms(forces[0])
             recording = _with(recording, forces[0])
             holdout = None if holdout is None else _with(holdout, forces[1])
         sealed = {"case": case.name, "kind": case.kind, "seed": case.seed, "truth": plain(truth)}
-        write_text(path(folder, SEALED, case), to_json(sealed | {"planted": planted}))
+        write_text(path(folder, SEALED, case), to_json(sealed))
         answer = answered(recording, log.baseline, holdout)
         answer |= {"oracle": None, "held_norm": _norm(holdout), "own_norm": norm}
     except Exception as error:  # the others go on
