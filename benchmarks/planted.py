@@ -30,8 +30,9 @@ To the recorded force of a real machine the force of one effect is added, comput
 position, velocity and time by the functions that also conceal it in drawn machines: the recording
 of a machine with that physics, at the same motion. Only effects that are such a force are planted:
 not presliding, lag, backlash, compliance, delays and faults of the actuator, which would have moved
-otherwise; no asymmetry, which every one of these machines has; nothing of another axis. The
-baseline is fitted, each direction of motion with its own parameters.
+otherwise; no asymmetry, which every one of these machines has; nothing of another axis. Half of the
+force, in power, acts where the axis moves: at rest, friction answers any force. The baseline is
+fitted, each direction of motion with its own parameters.
 
 - *Size*: root mean square of the planted force over the recording, in parts of the Coulomb level
   that `identify` finds in it.
@@ -68,7 +69,7 @@ def main() -> None:
     )
     more = [
         "## By recording and size",
-        by_recording(scores, logs, sizes),
+        by_recording(scores, cases),
         "## The recordings as they are",
         table(("", "verdict", "findings", "force error before, after"),
               comparing.described(folder, cases)),
@@ -82,16 +83,14 @@ def main() -> None:
     print(f"\n{more[1]}\n\n{more[3]}\n\nWritten to {folder}: report.md")
 
 
-def by_recording(scores, logs, sizes) -> str:
-    """The power table, for each recording and size."""
-    rows = []
-    for log in logs:
-        for size in sizes:
-            some = [
-                s for s in scores
-                if s.name.startswith(f"{log.name}-") and s.sizes and abs(s.sizes[0] - size) < 1e-6
-            ]  # fmt: skip
-            rows.append((f"{log.name}, {size:.0%}", str(len(some)), *rates(some)))
+def by_recording(scores, cases) -> str:
+    """The power table, for each recording and size that was asked for."""
+    groups: dict[str, list] = {}
+    asked = {case.name: case.size[0] for case in cases}
+    for score in scores:
+        name = f"{score.name.rpartition('-')[0]}, {asked[score.name]:.0%}"
+        groups.setdefault(name, []).append(score)
+    rows = [(name, str(len(some)), *rates(some)) for name, some in groups.items()]
     return table(("", "cases", "exactly", "first", "among", "within the class", "place"), rows)
 
 

@@ -76,6 +76,22 @@ def test_the_force_has_its_size(recording, name):
         np.testing.assert_allclose(held, force)
 
 
+def test_no_force_is_planted_that_acts_at_rest_only():
+    """Nine tenths of the time it stands at its lower end, where quantiles put a stop."""
+    time = np.arange(4000) * 2e-3
+    x = 0.05 * (1 - np.cos(2 * np.pi * np.clip(time - 7, 0, 0.9) / 0.9))
+    x = x + 1e-6 * np.round(np.random.default_rng(1).normal(size=time.size))
+    still = jf.Recording(time=time, force=np.zeros_like(time), position=x)
+    case = proof.Case("a-001", "single", 5, ("end_stop",), (0.1, 0.1))
+    motion = planting.nominal(still, *LEVEL)
+    try:
+        _, (force,) = planting.plant(still, None, LEVEL, "end_stop", case)
+    except ValueError as error:
+        assert "no room for end_stop" in str(error)
+    else:
+        assert np.sum(force[motion.way != 0] ** 2) > 0.5 * np.sum(force**2)
+
+
 def test_units_do_not_matter(recording):
     case = proof.Case("a-001", "single", 5, ("cogging",), (0.1, 0.1))
     _, (force,) = planting.plant(recording, None, LEVEL, "cogging", case)

@@ -51,6 +51,10 @@ PLANTED = tuple(
     }
 )  # fmt: skip
 
+# Draws of an effect's parameters until most of its force acts where the axis moves: at rest,
+# friction answers any force.
+ATTEMPTS = 50
+
 
 class Log(NamedTuple):
     """A recording to plant in: its name, the files, how they are read, and the baseline."""
@@ -168,12 +172,16 @@ def plant(
     motion = nominal(recording, *known)
     rng = np.random.default_rng((case.seed, zlib.crc32(name.encode())))
     kind = KINDS[name]
-    truth = kind.draw(rng, motion, case.size[0])
+    for _ in range(ATTEMPTS):
+        truth = kind.draw(rng, motion, case.size[0])
+        force = kind.force(truth, motion)
+        power = float(np.sum(force**2))
+        if power > 0 and np.sum(force[motion.way != 0] ** 2) > 0.5 * power:
+            break
+    else:
+        raise ValueError(f"this recording leaves no room for {name}: give another seed or log.")
     # Rounded, since a tenth is to be counted among those of a tenth or more.
-    size = round(kind.measure(truth, motion), 9)
-    forces = [kind.force(truth, motion)]
-    if not size > 0:
-        raise ValueError(f"this recording has no room for {name}.")
+    size, forces = round(kind.measure(truth, motion), 9), [force]
     if holdout is not None:
         other = nominal(holdout, *known)
         forces.append(
