@@ -9,6 +9,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import peer_methods as methods
+import prove_peers
 
 ROWS = 400
 
@@ -46,3 +47,48 @@ def test_a_residual_is_predicted(name):
     wave = lambda s: 1e-3 * np.sin(3 * s[:, 0])  # noqa: E731
     left = wave(held) - methods.PREDICTING[name](seen, wave(seen), held)
     assert np.linalg.norm(left) < 0.3 * np.linalg.norm(wave(held))
+
+
+# The table
+
+
+def case(kind, effect, before, after, oracle, *named):
+    said = {
+        "explain": {"named": [[name] for name in named], "after": after},
+        "boosted trees": {"named": None, "after": before},
+    }
+    effects = [effect] if effect else []
+    return {"kind": kind, "effects": effects, "before": before, "oracle": oracle, "said": said}
+
+
+def test_all_methods_are_judged_by_the_oracle_of_the_proof():
+    cases = [
+        case("single", "cogging", 0.10, 0.05, 0.04, "cogging", "spring"),
+        case("single", "cogging", 0.10, 0.10, 0.04),
+        case("healthy", None, 0.10, 0.12, None, "spring"),
+        case("healthy", None, 0.10, 0.10, None),
+    ]
+    explain, trees = prove_peers.rows(cases, ["boosted trees"])
+    assert explain[0] == "explain" and explain[1].startswith("50.0%")  # healthy, something named
+    assert explain[2].startswith("50.0%") and explain[4:6] == ("1", "7.50%")
+    assert explain[6] == "41.7%" and explain[7].startswith("50.0%")
+    assert trees[1:5] == ("-",) * 4 and trees[6] == "0.0%" and trees[7].startswith("0.0%")
+
+
+def test_a_case_without_answer_is_left_out():
+    assert prove_peers.explained({"error": "it broke"}) is None
+    answer = {
+        "error": None,
+        "findings": [{"effect": "spring"}],
+        "fit": {"holdout_force_error": {"before": 0.2, "after": 0.1}},
+    }
+    assert prove_peers.explained(answer) == {"named": [["spring"]], "after": 0.1}
+
+
+def test_methods_without_their_package_are_left_out(monkeypatch):
+    there = prove_peers.importlib.util.find_spec
+    monkeypatch.setattr(
+        prove_peers.importlib.util, "find_spec", lambda m: None if m == "sklearn" else there(m)
+    )
+    assert not set(methods.PREDICTING) & set(prove_peers.there())
+    assert {"stepwise", "stlsq", "raw ranking"} <= set(prove_peers.there())
