@@ -160,7 +160,7 @@ def compressed(
     **Arguments:** `speed`, m/s; `force` along the motion, N; `weights` of each direction, s, of
     which a sample has at most one; `panels`, from [`edges`][].
     """
-    side, weight = (weights[1] > 0).astype(jnp.int32), jnp.sum(weights, axis=0)
+    side, weight = (weights[1] > 0).astype(jnp.int32), weights[0] + weights[1]
     # What a line through some of the samples explains goes first: where the force has a large
     # offset, sums of what is left keep their digits.
     some = slice(None, None, max(1, speed.shape[0] // PLACES))

@@ -21,7 +21,7 @@ import jax
 MOST = 48
 # XLA's newer way to emit loops, and its optimisation of them, take five times as long to compile
 # an identification as it then runs quicker on 50,000 samples.
-_QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
+_QUICK: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
 QUICK_SAMPLES = 2**16
 
 _folder: Path | None = None

@@ -183,16 +183,11 @@ class Moments(eqx.Module):
         return taken_off(products[:, -1], size, inside, most)
 
 
-def taken_off(
-    along: Float[Array, "*n"],
-    size: Float[Array, "*n"],
-    inside: Float[Array, "*n"],
-    most: Float[Array, "*n"],
-) -> Float[Array, "*n"]:
+def taken_off(along, size, inside, most) -> Float[Array, "*n"]:
     """What a column takes off the cost: (r·e)²/(e·e − |Qᵀe|²), N²·s.
 
-    A column inside the span of Q leaves rounding of itself, and takes nothing off: rounding beside
-    e·e, `size`, and beside `most`, the square before what was common went.
+    Nothing if it is in the span of Q, its rest but rounding beside e·e, `size`, or beside `most`,
+    the square before what was common went.
     """
     rest = size - inside
     eps = 1e3 * jnp.finfo(rest.dtype).eps
@@ -206,19 +201,18 @@ def moments(
     roots: Float[Array, "R J"],
     parity: Float[Array, " J"] | None = None,
 ) -> Moments:
-    """The [`Moments`][] of rows.
+    """The [`Moments`][] of rows: columns without β, the force, N, and square roots of weights.
 
-    **Arguments:** `columns`, those without β; `target`, the force, N; `roots`, square roots of the
-    weights; `parity`, a sign for each row that bumps will be given without.
+    `parity` is a sign for each row that bumps will be given without.
     """
     bases = jax.lax.map(lambda r: orthonormal(r[:, None] * columns), roots)
     left = jax.vmap(lambda b, r: project_out(b, (r * target)[:, None])[:, 0])(bases, roots)
     # A rough share is enough to take off, and any function of the span may be: few places do.
     step = max(1, columns.shape[0] // PLACES)
-    together = root(jnp.sum(roots**2, axis=0))
-    together = together[: columns.shape[0] // step * step : step]
+    place = slice(0, columns.shape[0] // step * step, step)
+    together = root(jnp.sum(roots[:, place] ** 2, axis=0))
     signed = columns if parity is None else columns * parity[:, None]
-    some = together[:, None] * signed[: columns.shape[0] // step * step : step]
+    some = together[:, None] * signed[place]
     dual, matrix = gram_schmidt(some)
     # The functions whose values at these places are the orthonormal ones.
     function = signed @ matrix
@@ -237,8 +231,7 @@ def grid_costs(
 ) -> Float[Array, "R G"]:
     """The reduced cost of one bump, eq. (17), over a grid of β, N²·s, for each weighting.
 
-    `bump` maps β to the bump's values at the places of `rows`. Evaluated in tiles, so that memory
-    is bounded whatever the grid.
+    `bump` maps β to its values at the places of `rows`. In tiles: memory is bounded at any grid.
     """
 
     def tile(betas):

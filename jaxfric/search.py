@@ -1,6 +1,5 @@
 """β of the least reduced cost: the grid in one batched call, the refinement, its derivative."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -11,6 +10,7 @@ from jaxtyping import Array, Bool, Float
 from . import compress, reduced, small
 from .projections import Rows
 from .recording import Recording
+from .sides import Sides
 from .terms.base import AbstractTerm, Directional, Sum, summands
 from .terms.friction import AbstractBump, Coulomb, Viscous
 
@@ -67,68 +67,8 @@ class _Best(NamedTuple):
 
     start: Float[Array, " d"]
     cell: Float[Array, " d"]
-    sides: "_Sides | None" = None
+    sides: "Sides | None" = None
     samples: compress.Straightened | None = None
-
-
-class _Sides(NamedTuple):
-    """One bump as a function of β and places, the places of the moments, and each direction's
-    bounds of β, `(2, 2, d)`.
-    """
-
-    bump: Callable[[Float[Array, " d"], Float[Array, " J"]], Float[Array, " J"]]
-    places: Float[Array, " J"]
-    moments: reduced.Moments
-    boxes: Float[Array, "2 2 d"]
-    logarithmic: tuple[bool, ...]
-
-    def at(self, unit: Float[Array, " d"], box: Float[Array, "2 d"]) -> Float[Array, " J"]:
-        """The bump at a point of one direction's unit cube."""
-        return self.bump(reduced.decode(unit, box, self.logarithmic), self.places)
-
-    def costs(self, grid: Float[Array, "G d"]) -> Float[Array, "2 G"]:
-        """The cost of each direction over its own bounds."""
-
-        def side(rows, box):
-            return reduced.grid_costs(lambda unit: self.at(unit, box), grid, rows)[0]
-
-        return reduced.each(side, self.moments, self.boxes)
-
-    def gains(self, units: Float[Array, "2 k d"]) -> Float[Array, "2 k"]:
-        """What each direction's bump takes off its cost, at some points of its unit cube."""
-
-        def side(rows, box, points):
-            return rows.gains(jax.vmap(lambda unit: self.at(unit, box))(points))[0]
-
-        return reduced.each(side, self.moments, self.boxes, units)
-
-    def check(self, units: Float[Array, "2 k d"], samples: compress.Straightened):
-        """The gains on the samples that the places stand for, `(2, k)`."""
-
-        def decoded(units, box):
-            return jax.vmap(lambda unit: reduced.decode(unit, box, self.logarithmic))(units)
-
-        betas = jax.vmap(decoded)(units, self.boxes)
-        values = jax.vmap(jax.vmap(self.bump, (0, None)), (0, None))(betas, self.places)
-        shares = jnp.einsum("dim,dkm->dik", self.moments.against[:, :2], values)
-
-        def bumps(speed, side):
-            def one(low, high):
-                beta = jnp.where(side[:, None] == 1, high[None, :], low[None, :])
-                return jax.vmap(self.bump)(beta, speed)
-
-            return jax.vmap(one)(*betas)
-
-        return samples.gains(bumps, shares)
-
-    def refined(self, start: Float[Array, "2 d"], cell: Float[Array, "2 d"]):
-        """The minimiser of each direction near its start, `(2, d)`, and which converged."""
-        from . import refine  # optimistix takes long to import, and a kept program does without
-
-        def side(rows, box, start, cell):
-            return refine.descend(lambda y: -rows.gains(self.at(y, box)[None])[0, 0], start, cell)
-
-        return reduced.each(side, self.moments, self.boxes, start, cell)
 
 
 class _Problem(eqx.Module):
@@ -263,7 +203,7 @@ def _grid_sides(sides, problem: _Problem, points):
             return rows.columns(bumps.with_beta(beta), recording)[:, 0]
 
         logarithmic = problem.logarithmic[:count]
-        costs = _Sides(values, rows.time, moments, problem.boxes, logarithmic).costs(grid)
+        costs = Sides(values, rows.time, moments, problem.boxes, logarithmic).costs(grid)
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
     return _Best(starts.reshape(-1), cells.reshape(-1), *(() if shared else exact))
@@ -277,7 +217,8 @@ def _has_constant(linear) -> bool:
 def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linear):
     """The grid of one smooth bump over samples, by its contrast, and on nodes where that pays."""
     velocity = problem.recording.velocity
-    speed, used = jnp.abs(velocity), jnp.any(roots > 0, axis=0)
+    weights = problem.rows.positive, problem.rows.negative
+    speed, used = jnp.abs(velocity), weights[0] + weights[1] > 0
     slowest = jnp.min(jnp.where(used, speed, jnp.inf))
     slowest = jnp.where(jnp.isfinite(slowest), slowest, 1.0)
     speed = jnp.where(used, speed, slowest)
@@ -288,12 +229,12 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
 
     def sides(places, moments):
         logarithmic = problem.logarithmic[: grid.shape[1]]
-        return _Sides(contrast, places, moments, problem.boxes, logarithmic)
+        return Sides(contrast, places, moments, problem.boxes, logarithmic)
 
     if _straight(linear) and grid.shape[0] >= compress.LEAST_POINTS:
         # The first nonlinear parameter of a bump is its width.
         panels = compress.edges(slowest, jnp.max(speed), jnp.min(problem.boxes[:, 0, 0]))
-        moments, samples = compress.compressed(speed, sign * target, roots**2, panels)
+        moments, samples = compress.compressed(speed, sign * target, jnp.stack(weights), panels)
         here = sides(compress.nodes(panels), moments)
     else:
         here, samples = sides(speed, reduced.moments(columns, target, roots, sign)), None

@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 ORDER = """
     units programs recording terms signals models catalogue effects
     columns delimited cleaning tables io
-    small refine projections reduced compress uncertainty search
+    small refine projections reduced compress sides uncertainty search
     weighing identified question identification devices selection online
     control plant prediction simulation scenario
     explanation concealed documents glossary tabulate fleet proof report export cli __main__
