@@ -139,7 +139,10 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
         sided = isinstance(term, laws.PositionDependentFriction)
         harmonics = term.harmonics if isinstance(term, laws.Cogging) else 1
         periods = 1 / line_frequencies(evidence, "position")
-        if sided:
+        if not sided:
+            longest = Space([term], evidence).beta(np.ones(1))[0]
+            periods = periods[periods <= longest]
+        else:
             stroke = evidence.limits.high - evidence.limits.low
             periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
         yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))

@@ -17,9 +17,10 @@ from .candidates import OF_THE_MOMENT, Field
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import Named, search
+from .naming import OF_BASE, Named, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
+from .regression import Fit
 from .telling import tell
 from .timing import late, settled
 
@@ -71,19 +72,21 @@ def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: in
     known = _known(baseline, seed)
     asked, found = pursue(recording, holdout, known.structure, seed)
     found = _verified(found, asked, known.structure, seed)
+    rest = asked, found
     lateness = late(recording, asked, found)
     if lateness is not None:
         # To first order a delay is a column; what it leaves of second order would be named too.
         later = None if holdout is None else lateness.undone(holdout)
         there, behind = pursue(lateness.undone(recording), later, known.structure, seed)
         behind = _verified(behind, there, known.structure, seed)
-        found = settled(found, behind, lateness, asked)
+        found, behind = settled(found, behind, lateness, asked, there)
+        rest = there, behind
     wrong = None
     if known.model is not None:
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)
         if wrong is None and fixed:
-            asked, found = _as_given(known, asked, seed)
-    explanation = tell(recording, asked, found, known, wrong, seed)
+            asked, found = rest = _as_given(known, asked, seed)
+    explanation = tell(recording, asked, found, rest, known, wrong, seed)
     if simulate:
         models = {"before": explanation.baseline, "after": explanation.model}
         errors = {when: motion_error(model, recording) for when, model in models.items()}
@@ -127,12 +130,10 @@ def _verified(found: Named, asked: Question, structure, seed) -> Named:
             continue
         less = verification.without(found, evidence, number)
         place = len(found.last.terms) - len(found.taken) + number
-        if verification.helps(less, found.last, asked.held, found.rephased):
+        if _holds(less, found, asked, found.rephased):
             continue
         again = found.rephased | {place}
-        if verification.wavelike(found.last, place) and (
-            verification.helps(less, found.last, asked.held, again)
-        ):
+        if verification.wavelike(found.last, place) and _holds(less, found, asked, again):
             taken = [
                 t._replace(rephased=t.rephased or i == number) for i, t in enumerate(found.taken)
             ]
@@ -142,3 +143,11 @@ def _verified(found: Named, asked: Question, structure, seed) -> Named:
         left = contest(evidence, less, Field(evidence, structure), seed)
         found = found._replace(last=less, taken=taken, left=left)
     return found
+
+
+def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -> bool:
+    """Whether what `less` lacks helps on the held-out recording, beside others as much as here."""
+    if not verification.helps(less, found.last, asked.held, rephased):
+        return False
+    share = verification.share(less, found.last, found.base, asked.held, rephased)
+    return len(found.taken) == 1 or share >= OF_BASE

@@ -107,10 +107,12 @@ def _rivals(
         theirs = theirs - basis @ (basis.T @ theirs)
         size = np.linalg.norm(force) * np.linalg.norm(theirs)
         same = size > 0 and abs(force @ theirs) > ALIKE * size
-        # A term that is but the first order of its effect leaves a rest that is no evidence
-        # against the effects that it is known to be confused with, if they are believed at all.
-        effect = best.trial.candidate.effect
-        excused = effect.first_order and other.trial.candidate.effect.name in effect.confusable_with
+        # A term that is but the first order of its effect leaves a rest that is no evidence: neither
+        # against the effects that it is known to be confused with, nor, where it is the other,
+        # against itself; if they are believed at all.
+        effect, rival = best.trial.candidate.effect, other.trial.candidate.effect
+        rough = effect.first_order or rival.first_order
+        excused = rough and rival.name in effect.confusable_with
         half = now.energy - other.energy >= 0.5 * (now.energy - best.energy)
         believed = other.p_value <= LEVEL and half
         if same or other.score > best.score - RIVAL or (excused and believed):
@@ -179,16 +181,14 @@ def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float
         return True
     less = fit(now.terms, with_predictions(wide, now), now.betas, 4)
     seen = with_predictions(wide, less)
-    terms = (*now.terms, finalist.trial.candidate.term)
-    more = fit(terms, seen, (*less.betas, finalist.betas[-1]), 6)
-    term, basis = finalist.trial.candidate.term, less.basis()
-    forces = []
-    for beta, alpha in ((more.betas[-1], more.alphas[-1]), (finalist.betas[-1], finalist.alpha)):
-        force = seen.columns(term, beta[None])[0] @ alpha
-        forces.append(float(np.linalg.norm(force - basis @ (basis.T @ force))))
-    ratio = forces[0] / max(forces[1], 1e-300)
-    positive = bool(np.all(more.alphas[-1] > 0))
-    return positive and 0.5 < ratio < 2 and less.energy - more.energy >= least * less.energy
+    # At the β of the narrow kernel: where the wide one leaves little, it would find another.
+    term, beta, basis = finalist.trial.candidate.term, finalist.betas[-1], less.basis()
+    there = fit([term], seen, [beta], 0, basis)
+    ratio = np.linalg.norm(there.part(0)) / max(
+        float(np.linalg.norm(there.columns @ finalist.alpha)), 1e-300
+    )
+    positive = bool(np.all(there.alphas[0] > 0))
+    return positive and 0.5 < ratio < 2 and less.energy - there.energy >= least * less.energy
 
 
 def _pruned(evidence, now, taken, size):

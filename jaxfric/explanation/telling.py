@@ -26,11 +26,16 @@ def tell(
     recording: Recording,
     asked: Question,
     found: Named,
+    rest: tuple[Question, Named],
     known: Baseline,
     wrong: Mismatch | None,
     seed: int = 0,
 ) -> Explanation:
-    """The explanation of a recording from all that was found about it."""
+    """The explanation of a recording from all that was found about it.
+
+    `rest`: where what the findings leave is judged, the question and the findings themselves; where
+    the force acts late, on the recording with the force put back.
+    """
     units, evidence = recording.unit_names, asked.evidence
     first = found.base if wrong is None else at_values(known.model, evidence)
     force = float(np.sqrt(np.mean(evidence.target**2)))
@@ -38,9 +43,10 @@ def tell(
     before = _through_wide(before, first, asked.wide, seed)
     after = []
     if found.taken or wrong is not None:
-        seen = with_predictions(evidence, found.last)
-        after = _shown(locate(seen, found.last, seed), LATER_SHARE, force)
-        after = _through_wide(after, found.last, asked.wide, seed)
+        where, left = rest
+        seen = with_predictions(where.evidence, left.last)
+        after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
+        after = _through_wide(after, left.last, where.wide, seed)
     findings = _findings(found, asked, first, units)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
@@ -50,10 +56,10 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     return Explanation(
-        verdict=_verdict(bool(findings), before, after, _rough(found, asked)),
+        verdict=_verdict(bool(findings), before, after, _rough(*rest, found.base)),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
-        fit=_errors(found, asked, first),
+        fit=_errors(asked, first, *rest),
         not_visible=_not_visible(found, units),
         model=models[1],
         baseline=models[0],
@@ -107,11 +113,11 @@ ROUGH = 4.0
 HALF_ROUGH = 1.5
 
 
-def _rough(found: Named, asked: Question) -> bool:
+def _rough(asked: Question, found: Named, base: Fit) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or most of it all."""
     error = verification.error(found.last, asked.evidence)
     floor = verification.noise(found.last, asked.evidence.target)
-    most = bool(found.taken) and found.last.energy > 0.5 * found.base.energy
+    most = found.last is not base and found.last.energy > 0.5 * base.energy
     return error > (HALF_ROUGH if most else ROUGH) * floor and error > LINEARITY
 
 
@@ -193,18 +199,19 @@ def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _errors(found: Named, asked: Question, first: Fit) -> dict[str, Any]:
-    def pair(evidence, rephased=frozenset()):
+def _errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[str, Any]:
+    def pair(before, after, rephased=frozenset()):
         return {
-            "before": verification.error(first, evidence),
-            "after": verification.error(found.last, evidence, rephased),
+            "before": verification.error(first, before),
+            "after": verification.error(left.last, after, rephased),
         }
 
+    held = None if asked.held is None else pair(asked.held, where.held, left.rephased)
     return {
-        "force_error": pair(asked.evidence),
-        "holdout_force_error": None if asked.held is None else pair(asked.held, found.rephased),
+        "force_error": pair(asked.evidence, where.evidence),
+        "holdout_force_error": held,
         "simulation_error": None,
-        "noise_floor": verification.noise(found.last, asked.evidence.target),
+        "noise_floor": verification.noise(left.last, where.evidence.target),
     }
 
 

@@ -74,8 +74,14 @@ def _renamed(taken: Taken, name: str, rivals: tuple[str, ...]) -> Taken:
     return taken._replace(trial=taken.trial._replace(candidate=candidate), rivals=rivals)
 
 
-def settled(found: Named, behind: Named, lateness: Late, asked: Question) -> Named:
-    """What was found once the force was put back, `behind`, beside the delay or lag itself."""
+def settled(
+    found: Named, behind: Named, lateness: Late, asked: Question, there: Question
+) -> tuple[Named, Named]:
+    """What was found once the force was put back, `behind`, and the delay or lag itself.
+
+    Beside it the same without, on the recording with the force put back, `there`: what that leaves
+    is what the findings leave, while a column for the delay keeps its second order.
+    """
     others = [t for t in behind.taken if not isinstance(t.trial.candidate.term, LATE)]
     kept = [i for i, term in enumerate(behind.last.terms) if not isinstance(term, LATE)]
     terms = [*(behind.last.terms[i] for i in kept), lateness.taken.trial.candidate.term]
@@ -89,7 +95,9 @@ def settled(found: Named, behind: Named, lateness: Late, asked: Question) -> Nam
         if less.energy - now.energy < OF_BASE * found.base.energy:
             terms, others, now = _but(terms, place), _but(others, number), less
     now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
-    return found._replace(last=now, taken=[*others, lateness.taken], left=behind.left)
+    seen = with_predictions(there.evidence, behind.last)
+    rest = behind._replace(last=fit(terms[:-1], seen, now.betas[:-1], 6), taken=others)
+    return found._replace(last=now, taken=[*others, lateness.taken], left=behind.left), rest
 
 
 def _but(items: Sequence, place: int) -> list:

@@ -28,13 +28,18 @@ def _stroke(scales):
     return scales.high - scales.low
 
 
+# A pitch is one that is seen to repeat: a whole period and a quarter in the stroke. What does not
+# is a turn of the whole axis.
+_REPEATED = 0.8
+
+
 def _pitch_bounds(scales):
-    """From the shortest period that is sampled to one whole period in the stroke."""
-    return _shortest(scales), _stroke(scales)
+    """From the shortest period that is sampled to the longest that repeats within the stroke."""
+    return _shortest(scales), _REPEATED * _stroke(scales)
 
 
 def _long_bounds(scales):
-    """From one period in the stroke to an eighth of one.
+    """From the longest period that repeats within the stroke to eight strokes.
 
     There the sine spans ±π/8 about its middle and differs from a parabola by (π/8)³/6 = 1 %: a
     longer period can no longer be told.
@@ -69,7 +74,7 @@ def waves(argument, harmonics: int = 1):
 
 
 class GravityUnbalance(AbstractLaw):
-    """Weight of an eccentric mass, at most one turn a stroke: F = A sin(2πx/L + φ).
+    """Weight of an eccentric mass, hardly a turn a stroke: F = A sin(2πx/L + φ).
 
     `unbalance_period` L, m (2π rad on the turning axis itself). The force's constant part cannot
     be told from an [`Offset`][jaxfric.terms.Offset].
