@@ -25,8 +25,8 @@ PANELS = 13
 # over a 64th of it (each is worth a factor of some 2 · 64), and a sample adds to fewer sums.
 PIECES = 64
 PIECE_ORDER = 6
-# One pass over the samples costs about as much as 20 bumps, and the refinement evaluates 30 more;
-# smaller grids are not worth it.
+# The passes over the samples cost about as much as 10 bumps, and the refinement evaluates 30 more;
+# on short recordings smaller grids are not worth it.
 LEAST_POINTS = 100
 
 

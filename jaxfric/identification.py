@@ -73,8 +73,11 @@ def solve_rows(term, recording, projection, width, given, grid) -> Identified:
     def one(row):
         return _identify(term, row, projection, width, given, grid)
 
-    # Small batches: a refinement loop under vmap makes every row wait for the slowest.
-    return jax.lax.map(one, recording, batch_size=min(16, recording.time.shape[0]))
+    # Small batches: a refinement loop under vmap makes every row wait for the slowest. Long rows
+    # one by one, so that of the ways of `reduced.orthonormal` each goes one, not both.
+    count, samples = recording.time.shape
+    together = None if samples >= reduced.TALL else min(16, count)
+    return jax.lax.map(one, recording, batch_size=together)
 
 
 @programs.kept

@@ -1,5 +1,7 @@
 """The reduced cost L(β) against brute force, and the refinement against the root of its slope."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +11,7 @@ from scipy.optimize import brentq
 import jaxfric as jf
 from jaxfric import reduced, refine
 from jaxfric.identified import result_names
+from jaxfric.programs import quick_options
 from jaxfric.projections import Rows
 from jaxfric.search import search
 
@@ -284,3 +287,53 @@ def test_each_direction_is_searched_inside_its_own_bounds(points):
     held = search(friction, bare, rows, jnp.asarray([[0.002, 0.03], [0.1, 0.3]]), points)
     assert bool(held.on_border)
     np.testing.assert_allclose(held.beta, [same.beta[0], 0.03], rtol=1e-9)
+
+
+quickly = functools.partial(jax.jit, compiler_options=quick_options())
+
+
+def tall(kind, rows=6000):
+    """Columns long enough for the quick way, some of which it must leave to Gram-Schmidt."""
+    speed = np.random.default_rng(2).uniform(0.1, 0.101 if kind == "narrow" else 1.0, rows)
+    columns = [np.ones(rows), speed, np.exp(-((speed / 0.2) ** 2)), np.zeros(rows)]
+    if kind == "spanned":
+        columns[3] = 3 * columns[0] - 2e-5 * columns[1]
+    elif kind == "hidden":  # from every row that is looked at first
+        columns[3] = np.where(np.arange(rows) == 7, 1.0, 0.0)
+    elif kind == "close":
+        columns[3] = columns[2] + 1e-9 * speed**3
+    scales = np.array([1e-6, 1.0, 1e6, 1e3])
+    return jnp.asarray(np.stack(columns, axis=1) * scales)
+
+
+@pytest.mark.parametrize("kind", ["plain", "narrow", "spanned", "hidden", "close"])
+def test_tall_columns_are_orthonormalised_as_by_gram_schmidt(kind):
+    columns = tall(kind)
+    basis, slow = quickly(reduced.orthonormal)(columns), reduced.gram_schmidt(columns)[0]
+    own = np.ones(4) if kind in ("hidden", "close") else np.array([1.0, 1.0, 1.0, 0.0])
+    np.testing.assert_allclose(basis.T @ basis, np.diag(own), atol=1e-13)
+    # A direction is known as well as what is left of its column: a narrow range leaves 1e-6.
+    np.testing.assert_allclose(basis.T @ slow, np.diag(own), atol=1e-8)
+    target = columns @ jnp.asarray([1e6, 2.0, 3e-6, 0.0]) + 1e-3
+    alpha = quickly(reduced.least_squares)(columns, target)
+    np.testing.assert_allclose(columns.T @ (target - columns @ alpha) / 1e6, 0.0, atol=1e-6)
+    if own[3] == 0:
+        assert alpha[3] == 0
+
+
+def test_derivatives_of_a_tall_least_squares_are_those_of_a_short_one():
+    columns, few = tall("plain"), tall("plain", 600)
+    tiled = jnp.tile(few, (10, 1))
+    force = jnp.asarray(np.random.default_rng(3).normal(size=600))
+
+    def total(scale, columns, force):
+        bent = columns * (1 + scale * columns[:, 1:2])
+        return jnp.sum(reduced.least_squares(bent, force) * jnp.asarray([1e-6, 1.0, 1e6, 0.0]))
+
+    assert columns.shape[0] >= reduced.TALL > few.shape[0]
+    for order in (jax.grad, lambda f: jax.grad(jax.grad(f))):
+        tall_, short = (
+            jax.jit(order(total))(0.3, c, f)
+            for c, f in ((tiled, jnp.tile(force, 10)), (few, force))
+        )
+        np.testing.assert_allclose(tall_, short, rtol=1e-8)
