@@ -331,7 +331,7 @@ def test_derivatives_of_a_tall_least_squares_are_those_of_a_short_one():
         return jnp.sum(reduced.least_squares(bent, force) * jnp.asarray([1e-6, 1.0, 1e6, 0.0]))
 
     assert columns.shape[0] >= reduced.TALL > few.shape[0]
-    for order in (jax.grad, lambda f: jax.grad(jax.grad(f))):
+    for order in (jax.grad, lambda f: jax.jacfwd(jax.jacfwd(f))):
         tall_, short = (
             jax.jit(order(total))(0.3, c, f)
             for c, f in ((tiled, jnp.tile(force, 10)), (few, force))
