@@ -1,5 +1,6 @@
 """Simulation against closed forms: stopping, sticking, energy, units, gradients."""
 
+import dataclasses
 import os
 import pathlib
 from typing import ClassVar
@@ -13,10 +14,10 @@ from hypothesis import given, settings, strategies as st
 
 from jaxfric import models, terms
 from jaxfric.control import PD, PID, Cascade, Encoder
-from jaxfric.prediction import predict
+from jaxfric.prediction import predict, relative_error
 from jaxfric.recording import Recording
 from jaxfric.simulation import default_substeps, simulate
-from jaxfric.terms import AbstractLaw, Parameter
+from jaxfric.terms import AbstractLaw, Parameter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
 
 TRUTH = {
@@ -332,3 +333,21 @@ def test_emps_in_closed_loop_meets_the_published_simulation_error():
     force = jnp.linalg.norm(out.force - recording.force) / jnp.linalg.norm(recording.force)
     assert float(position) < 0.0004
     assert float(force) < 0.08
+
+
+def test_a_delay_is_predicted_in_whole_inside_each_segment():
+    values = {"inertia": 5.0} | {f"{n}{s}": 2.0 for n in ("coulomb", "viscous") for s in "+-"}
+    model = models.from_parameters(models.coulomb_viscous(), values)
+    late = models.from_parameters(model.term + TransportDelay(), values | {"delay": 0.02})
+    time = np.arange(4000) / 1000
+    run = Recording(time, 0 * time, 0.1 * np.sin(3 * time), segment=(time >= 2).astype(np.int32))
+    at_once, early = (np.asarray(predict(each, run)) for each in (model, late))
+    for start in (0, 2000):
+        inner = slice(start + 300, start + 1700)
+        np.testing.assert_allclose(
+            early[inner], at_once[start + 320 : start + 1720], rtol=0, atol=1e-9
+        )
+    # At the end of a segment there is no later sample of it to know.
+    np.testing.assert_array_equal(early[1980:2000], np.full(20, at_once[1999]))
+    seen = dataclasses.replace(run, force=early)
+    assert float(relative_error(late, seen)) < 0.01 < 0.05 < float(relative_error(model, seen))

@@ -107,9 +107,9 @@ def _rivals(
         theirs = theirs - basis @ (basis.T @ theirs)
         size = np.linalg.norm(force) * np.linalg.norm(theirs)
         same = size > 0 and abs(force @ theirs) > ALIKE * size
-        # A term that is but the first order of its effect leaves a rest that is no evidence: neither
-        # against the effects that it is known to be confused with, nor, where it is the other,
-        # against itself; if they are believed at all.
+        # What a term leaves that is but the first order of its effect is no evidence: neither
+        # against the effects that it is known to be confused with nor, where it is the other one,
+        # against itself. If they are believed at all.
         effect, rival = best.trial.candidate.effect, other.trial.candidate.effect
         rough = effect.first_order or rival.first_order
         excused = rough and rival.name in effect.confusable_with

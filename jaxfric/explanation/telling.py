@@ -7,10 +7,11 @@ import numpy as np
 
 from ..effects import EFFECTS
 from ..recording import Recording
+from ..uncertainty import Estimate
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
-from .chance import LEVEL
+from .chance import LEVEL, blocks
 from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
@@ -20,6 +21,7 @@ from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fit
 from .sentences import mismatch_sentence, sentence
+from .timing import LATE
 
 
 def tell(
@@ -130,7 +132,7 @@ def _verdict(named: bool, before: list[Place], after: list[Place], rough: bool) 
 def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]:
     seen = with_predictions(asked.evidence, found.last)
     start = len(found.last.terms) - len(found.taken)
-    values = spelled.estimates(found.last, asked.block, units)[start:]
+    values = _with_smoothing(found.last, asked, units)[start:]
     findings = []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
@@ -160,6 +162,20 @@ def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]
             )  # fmt: skip
         )
     return sorted(findings, key=lambda finding: -finding.share)
+
+
+def _with_smoothing(now: Fit, asked: Question, units) -> list[dict[str, Estimate]]:
+    """The parameters of each term; their errors contain what a kernel of twice the width changes.
+
+    A time by which the force is late was found by other means.
+    """
+    ours = spelled.estimates(now, asked.block, units)
+    if asked.wide is None or any(isinstance(term, LATE) for term in now.terms):
+        return ours
+    again = fit(now.terms, with_predictions(asked.wide, now), now.betas, 4)
+    block = blocks(asked.wide.elapsed[asked.wide.centre], asked.wide.reach)
+    wide = spelled.estimates(again, block, units)
+    return [spelled.with_smoothing(*pair) for pair in zip(ours, wide, strict=True)]
 
 
 def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list[dict[str, Any]]:
