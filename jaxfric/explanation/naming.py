@@ -6,7 +6,7 @@ import numpy as np
 
 from ..terms.base import AbstractTerm
 from .candidates import Field
-from .chance import LEVEL
+from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .predictions import with_predictions
@@ -136,6 +136,10 @@ def _force(finalist: Finalist, evidence) -> np.ndarray:
 LINEARITY = 2e-3
 
 
+# Sharp terms hold the very noise that they are judged by: none of the draws may be as good.
+RAREST = 1.5 / (1 + DRAWS)
+
+
 # What comes after stronger terms must also be this part of what the base left: no term has quite
 # the shape of what it stands for, and a twentieth of its amplitude may stay; a tenth where the term
 # is but the first order of its effect.
@@ -162,9 +166,10 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
                 isinstance(finalist.trial.candidate.term, type(term)) for term in now.terms[1:]
             )
             enough &= not again
-        if not (finalist.score > 0 and finalist.p_value <= LEVEL and enough):
-            continue
         sharp = finalist.trial.candidate.effect.name in SHARP
+        level = RAREST if sharp else LEVEL
+        if not (finalist.score > 0 and finalist.p_value <= level and enough):
+            continue
         if sharp and not _confirmed(finalist, now, wide, least):
             continue
         return finalist

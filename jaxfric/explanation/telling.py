@@ -11,7 +11,7 @@ from ..uncertainty import Estimate
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
-from .chance import LEVEL, blocks
+from .chance import LEVEL
 from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
@@ -173,7 +173,7 @@ def _with_smoothing(now: Fit, asked: Question, units) -> list[dict[str, Estimate
     if asked.wide is None or any(isinstance(term, LATE) for term in now.terms):
         return ours
     again = fit(now.terms, with_predictions(asked.wide, now), now.betas, 4)
-    block = blocks(asked.wide.elapsed[asked.wide.centre], asked.wide.reach)
+    block = np.linspace(0, asked.block[-1] + 1, len(asked.wide.rows), endpoint=False).astype(int)
     wide = spelled.estimates(again, block, units)
     return [spelled.with_smoothing(*pair) for pair in zip(ours, wide, strict=True)]
 
