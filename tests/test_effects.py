@@ -338,6 +338,34 @@ def test_backlash_acts_inside_the_gap_and_nowhere_else():
     assert share == pytest.approx(8 / 9, rel=0.01)
 
 
+@pytest.mark.parametrize("driven", ["inertia", "friction", "both"])
+def test_a_load_swings_as_its_equation_says(driven):
+    """r̈ + 2ζω ṙ + ω² r = −a − sign(v), stepped twenty times as finely."""
+    time = np.arange(4000) / 1000
+    speed = 0.2 * np.sin(5 * time) + 0.05 * np.sin(31 * time + 1)
+    run = Recording(time, 0 * time, velocity=speed)
+    term = T.Compliance(4.0, 0.15, driven)
+    omega, fine = 2 * np.pi * 4.0, 20
+    clock = np.arange(4000 * fine) / (1000 * fine)
+    rate = np.interp(clock, time[1:] - 0.0005, np.diff(speed) * 1000)
+    # Three hundredths of the root-mean-square speed are no direction yet.
+    rest = 0.03 * np.sqrt(np.mean(speed**2))
+    way = np.clip(np.interp(clock, time, speed) / rest, -1, 1)
+    wanted = []
+    for pull in {"inertia": [rate], "friction": [way], "both": [rate, way]}[driven]:
+        stretch, swing, log = -pull[0] / omega**2 * (pull is way), 0.0, []
+        for each in pull:
+            log.append(swing)
+            swing += (-each - 2 * 0.15 * omega * swing - omega**2 * stretch) / (1000 * fine)
+            stretch += swing / (1000 * fine)
+        wanted.append(log[::fine])
+    found = np.asarray(term.momentum(run))
+    for column, log in zip(found.T, wanted, strict=True):
+        assert np.max(np.abs(column - log)) < 0.01 * np.max(np.abs(log))
+    with pytest.raises(ValueError, match="inertia, friction, both"):
+        T.Compliance(4.0, 0.15, "gravity")
+
+
 def test_a_memory_starts_anew_in_each_segment():
     recording = motion(count=40)
     segment = np.arange(40) // 20
