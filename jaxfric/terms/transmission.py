@@ -81,8 +81,8 @@ class Compliance(AbstractMemory):
     by the spring; `load_resonance` ω/2π, Hz, at which the load swings against a held motor;
     `damping_ratio` ζ. What excites it, `driven`, is "inertia", "friction" or "both"; what does
     not is left out. The oscillator is exact for a velocity that is straight between the samples;
-    to first order, the load goes the way of the motor, which is none at rest. A segment starts with the load at rest on
-    its spring.
+    to first order the load goes the way of the motor, and none at rest. A segment starts with the
+    load at rest on its spring.
     """
 
     load_resonance: Float[Array, ""] | float = UNKNOWN
