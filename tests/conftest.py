@@ -11,6 +11,8 @@ import jax
 import pytest
 from hypothesis import settings
 
+from jaxfric import programs
+
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
@@ -33,6 +35,21 @@ def few_programs():
     if maps.exists() and len(maps.read_bytes().splitlines()) > MOST_MAPS:
         jax.clear_caches()
         gc.collect()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def kept_programs(tmp_path_factory, request):
+    """Identifications compiled as the command line does it, quickly and once for all workers.
+
+    Not in a run of the slow tests: what Python users get is compiled there.
+    """
+    if request.config.getoption("-m") == "slow":
+        yield
+        return
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    with programs.kept_in(shared / "programs"):
+        yield
 
 
 @pytest.fixture(scope="session")
