@@ -88,11 +88,9 @@ def test_nothing_is_missing_where_nothing_is(healthy):
 
 @pytest.mark.parametrize(
     "effect",
-    ["cogging", "friction_step"]
-    + [
-        pytest.param(name, marks=pytest.mark.slow)
-        for name in list(CASES)[1:]
-        if name != "friction_step"
+    [
+        "cogging",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name != "cogging"),
     ],
 )
 def test_what_is_missing_is_named_with_its_parameters(healthy, effect):

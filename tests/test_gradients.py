@@ -174,6 +174,7 @@ def test_the_bounds_move_the_parameter_on_the_border_and_no_other(data):
     np.testing.assert_allclose(by_high, 0.0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_transformations_agree(data):
     term = bumped()
     velocity, force, weight = data

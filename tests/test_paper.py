@@ -85,6 +85,7 @@ def test_alm_is_exact_without_noise(period):
         assert abs(float(found.parameters[name].value) / scenario.TRUTH[name] - 1) < 2e-3, name
 
 
+@pytest.mark.slow
 def test_alm_intervals_cover_the_truth(period):
     error, deviation = errors(identify("lorentzian", noisy_batch(period)))
     covered = np.mean(np.abs(error) < 2.0 * deviation)
@@ -114,6 +115,7 @@ def test_agm_is_close_and_acvm_wrong_only_at_low_velocity(period):
     assert curve_error(acvm, 1e-4, 0.01) > 0.1 * 28
 
 
+@pytest.mark.slow
 def test_neither_mass_nor_acceleration_is_needed_and_p_needs_the_right_mass(period):
     """On a record that does not close, (P) with a wrong mass is biased; (L) closes its window."""
     cut = jax.tree.map(lambda x: x[:8500], period)

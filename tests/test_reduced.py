@@ -276,7 +276,10 @@ def test_single_precision_is_sane(name):
             assert gap <= 0.3 * float(estimate.standard_error) + 1e-3 * abs(float(estimate.value))
 
 
-@pytest.mark.parametrize("points", [None, 64], ids=["nodes", "samples"])
+@pytest.mark.parametrize(
+    "points",
+    [pytest.param(None, id="nodes"), pytest.param(64, id="samples", marks=pytest.mark.slow)],
+)
 def test_each_direction_is_searched_inside_its_own_bounds(points):
     friction, bare, rows, *_ = problem("gaussian", 0.02)
     wide, odd = ([[0.002, low], [0.1, high]] for low, high in ((0.002, 0.1), (0.011, 0.3)))
@@ -321,6 +324,7 @@ def test_tall_columns_are_orthonormalised_as_by_gram_schmidt(kind):
         assert alpha[3] == 0
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_tall_least_squares_are_those_of_a_short_one():
     columns, few = tall("plain"), tall("plain", 600)
     tiled = jnp.tile(few, (10, 1))

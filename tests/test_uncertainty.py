@@ -71,10 +71,13 @@ def coverage(name, projection, count, seed):
     return np.array(held), fine
 
 
-PROJECTIONS = [jf.ClosedWindows(), jf.WeakForm(16)]
+PROJECTIONS = [
+    pytest.param(jf.ClosedWindows(), id="closed", marks=pytest.mark.slow),
+    pytest.param(jf.WeakForm(16), id="weak"),
+]
 
 
-@pytest.mark.parametrize("projection", PROJECTIONS, ids=["closed", "weak"])
+@pytest.mark.parametrize("projection", PROJECTIONS)
 def test_coverage_of_the_affine_model(projection):
     held, fine = coverage("coulomb-viscous", projection, 48, seed=11)
     assert fine.all()
