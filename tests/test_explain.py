@@ -11,6 +11,8 @@ import pytest
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.effects import EFFECTS
 from jaxfric.explanation import candidates, evidence, explain, naming, pulses, question, telling
+from jaxfric.explanation.sentences import sentence
+from jaxfric.uncertainty import Estimate
 
 TIME = np.arange(16384) / 1000.0
 COULOMB = 20.0
@@ -231,3 +233,12 @@ def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     assert [place["coordinate"] for place in places] == [EFFECTS["friction_step"].coordinates[0]]
     assert places[0]["share"] == found.findings[0].share and places[0]["size"] > 0
     assert telling._everywhere(places, found.findings, base) == places
+
+
+def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
+    seen = Estimate(np.float64(-38.9), np.float64(1.6), "N·s/m")
+    hidden = Estimate(np.float64(0.0369), np.float64(np.inf), "N")
+    parameters = {"viscous_asymmetry": seen, "coulomb_asymmetry": hidden}
+    text = sentence("asymmetric_friction", parameters, 0.45, ())
+    assert "-38.9 N·s/m ± 3.2 N·s/m with speed" in text
+    assert "0.0369" not in text and "cannot tell" in text

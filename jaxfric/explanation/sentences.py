@@ -9,7 +9,9 @@ def quantity(estimate: Estimate, scale: float = 1.0) -> str:
     """A value with its unit and half its 95 % interval: "1.90 N ± 0.20 N"."""
     value, error = float(estimate.value) * scale, float(estimate.standard_error) * scale
     unit = f" {estimate.unit}" if estimate.unit not in ("", "1") else ""
-    if not math.isfinite(error) or error <= 0:
+    if math.isinf(error):  # the data cannot see it, and its value is any
+        return "an amount that this recording cannot tell"
+    if not error > 0:
         return f"{value:.3g}{unit}"
     half = 2 * error
     digits = max(0, 1 - math.floor(math.log10(half)))
@@ -21,8 +23,8 @@ def quantity(estimate: Estimate, scale: float = 1.0) -> str:
 # What each effect is, with the parameters of its term in braces.
 _TEXTS = {
     "asymmetric_friction": (
-        "Friction differs with the direction: half the difference is {coulomb_asymmetry} constant "
-        "and {viscous_asymmetry} with speed"
+        "Friction differs with the direction: half the difference is {viscous_asymmetry} with "
+        "speed and, at any speed, {coulomb_asymmetry}"
     ),
     "stribeck": "Friction falls with speed at low velocity: a Stribeck bump of {stribeck_force+} "
     "forward and {stribeck_force-} backward, over {stribeck_velocity+} and {stribeck_velocity-}",
