@@ -54,10 +54,7 @@ def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     A column that the ones before it already span becomes zero, and so do its derivatives: a
     Householder QR would return an arbitrary direction and NaN derivatives there.
     """
-    if columns.shape[0] < TALL:
-        return gram_schmidt(columns)[0]
-    near, _, white, good = _whitened(columns)
-    return jax.lax.cond(good, lambda: near @ white, lambda: gram_schmidt(columns)[0])
+    return _basis(columns).orthonormal()
 
 
 def gram_schmidt(columns: Float[Array, "J p"]) -> tuple[Float[Array, "J p"], Float[Array, "p p"]]:
@@ -85,21 +82,48 @@ def gram_schmidt(columns: Float[Array, "J p"]) -> tuple[Float[Array, "J p"], Flo
     return jax.lax.scan(append, empty, (columns.T, places))[0]
 
 
-def _whitened(columns):
-    """A quicker way than Gram-Schmidt for tall columns, and whether it is as exact.
+class _Basis(eqx.Module):
+    """An orthonormal basis Q = A M of columns A, as A `first` = `near` and Q = `near` `white`."""
+
+    near: Float[Array, "J p"]
+    first: Float[Array, "p p"]
+    white: Float[Array, "p p"]
+
+    def orthonormal(self) -> Float[Array, "J p"]:
+        """Q."""
+        return self.near @ self.white
+
+    def solve(self, target: Float[Array, " J"]) -> Float[Array, " p"]:
+        """Least-squares coefficients M Qᵀ t."""
+        return self.first @ (self.white @ (self.white.T @ (self.near.T @ target)))
+
+    def divide(self, vector: Float[Array, " p"]) -> Float[Array, " p"]:
+        """(AᵀA)⁻¹ = M Mᵀ times a vector."""
+        matrix = self.first @ self.white
+        return matrix @ (matrix.T @ vector)
+
+
+def _basis(columns) -> _Basis:
+    """The basis of [`gram_schmidt`][], of tall columns in a quicker way where that is as exact.
 
     Gram-Schmidt on some of the rows makes the columns nearly orthonormal on all of them, and what
     is left to do to those loses nothing in the product QᵀQ (a Cholesky QR with a preconditioner;
-    Fukaya et al. 2020). **Returns:** the nearly orthonormal columns, what made them, what makes
-    them orthonormal, both upper triangular, and whether they were as near as that needs.
+    Fukaya et al. 2020).
     """
+
+    def slow():
+        basis, matrix = gram_schmidt(columns)
+        return _Basis(basis, matrix, jnp.eye(columns.shape[1], dtype=columns.dtype))
+
+    if columns.shape[0] < TALL:
+        return slow()
     some = jax.lax.stop_gradient(columns[:: columns.shape[0] // PLACES])
     first = gram_schmidt(some)[1]
     # What the few rows do not tell from the columns before it is left as it is.
     first = first + jnp.diag(jnp.where(jnp.diagonal(first) > 0, 0.0, 1.0).astype(first.dtype))
     near = columns @ first
     white, pivot = small.whiten(near.T @ near)
-    return near, first, white, pivot > NEAR
+    return jax.lax.cond(pivot > NEAR, lambda: _Basis(near, first, white), slow)
 
 
 def project_out(basis: Float[Array, "J q"], values: Float[Array, "J k"]) -> Float[Array, "J k"]:
@@ -127,17 +151,21 @@ def cost(
     return jnp.sum(residual(basis, target, bumps) ** 2)
 
 
+@jax.custom_jvp
 def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
     """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
+    return _basis(columns).solve(target)
 
-    def slow():
-        basis, matrix = gram_schmidt(columns)
-        return matrix @ (basis.T @ target)
 
-    if columns.shape[0] < TALL:
-        return slow()
-    near, first, white, good = _whitened(columns)
-    return jax.lax.cond(good, lambda: first @ (white @ (white.T @ (near.T @ target))), slow)
+@least_squares.defjvp
+def _(primals, tangents):
+    """By the normal equations Aᵀ(t − Aα) = 0: the steps of the solution are not differentiated."""
+    columns, target = primals
+    turned, moved = tangents
+    basis = _basis(columns)
+    alpha = basis.solve(target)
+    rest = target - columns @ alpha
+    return alpha, basis.solve(moved - turned @ alpha) + basis.divide(turned.T @ rest)
 
 
 class Moments(eqx.Module):

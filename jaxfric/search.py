@@ -91,6 +91,12 @@ class _Problem(eqx.Module):
         """The bounds of each direction's β, where it has its own."""
         return jnp.moveaxis(self.box.reshape(2, 2, -1), 1, 0)
 
+    def weighted(self, unit):
+        """All weighted columns at a point of the unit cube, `(J, p)`, and the weighted force."""
+        root = reduced.root(self.rows.positive + self.rows.negative)
+        target = self.rows.target - self.rows.offset(self.term, self.recording)
+        return root[:, None] * self.columns(self.term, unit), root * target
+
     def linear(self):
         """Orthonormal weighted columns without β, root weights, and the weighted force less
         their part in it.
@@ -150,9 +156,19 @@ def _implicit(unit, problem: _Problem):
 def _(primals, tangents):
     unit, problem = primals
 
+    def affine(unit):
+        return reduced.least_squares(*problem.weighted(unit))
+
+    alpha, slope = affine(unit), jax.jacfwd(affine)(unit)
+
+    def residual(unit, problem, start=unit):
+        # α follows β to first order, so that its own movement does not couple to that of β.
+        columns, target = problem.weighted(unit)
+        return target - columns @ (alpha + slope @ (unit - start))
+
     def gradient(unit, problem):
-        residuals = problem.residuals()
-        return jax.jacfwd(lambda y: 0.5 * jnp.sum(residuals(y) ** 2))(unit)
+        left = residual(unit, problem)
+        return jax.jacfwd(residual)(unit, problem).T @ left
 
     _, change = jax.jvp(lambda p: gradient(unit, p), (problem,), (tangents[1],))
     hessian = jax.jacfwd(gradient)(unit, problem)
