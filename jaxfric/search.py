@@ -154,7 +154,7 @@ def _implicit(unit, problem: _Problem):
 
 @_implicit.defjvp
 def _(primals, tangents):
-    unit, problem = primals
+    unit, problem = _implicit(*primals), primals[1]  # so that derivatives of this follow it too
 
     def affine(unit):
         return reduced.least_squares(*problem.weighted(unit))

@@ -191,6 +191,20 @@ def test_transformations_agree(data):
 
 
 @pytest.mark.slow
+def test_second_derivatives_follow_the_minimiser(data):
+    velocity, force, weight = data
+    direction = jnp.cos(jnp.arange(SIZE, dtype=float))
+
+    def along(amount):
+        moved = fit(bumped(), velocity, force + amount * direction, weight * jnp.exp(amount))
+        return jnp.sum(moved)
+
+    slope, step = jit(jax.grad(along)), 1e-4
+    numeric = (slope(step) - slope(-step)) / (2 * step)
+    np.testing.assert_allclose(jit(jax.hessian(along))(0.0), numeric, rtol=1e-6)
+
+
+@pytest.mark.slow
 def test_a_gradient_costs_a_few_evaluations(data):
     """No loop of the search is differentiated: a fit on nodes beside its value and gradient."""
     term, count = bumped(), 20_000
