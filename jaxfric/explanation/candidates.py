@@ -1,5 +1,6 @@
 """The terms that compete for a residual, with the places of their nonlinear parameters to try."""
 
+import dataclasses
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -8,6 +9,7 @@ import numpy as np
 from .. import terms as laws
 from ..catalogue import CATALOGUE, Effect
 from ..terms.base import AbstractTerm, Directional, summands
+from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
 from .regression import Space
 
@@ -120,9 +122,18 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         if effect.needs - have or (effect.name in OF_THE_MOMENT and not evidence.clock):
             continue
         for term in effect.shapes(limits):
+            if "position" in term.coordinates and "position" not in have:
+                continue
+            if isinstance(term, laws.FrictionalLag):
+                term = dataclasses.replace(term, bump=_bump(base))
             found += list(_with_places(effect, term, evidence))
     present = {type(t) for t in _leaves(base)}
     return [c for c in found if not (set(map(type, _leaves(c.term))) <= present)]
+
+
+def _bump(base: AbstractTerm) -> AbstractBump:
+    """The kind of bump that the baseline has, or a Gaussian one."""
+    return next((t for t in _leaves(base) if isinstance(t, AbstractBump)), laws.Gaussian())
 
 
 def _leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
@@ -154,6 +165,14 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
         yield Candidate(effect, term, _spots(evidence))
     elif kind is laws.Compliance:
         yield Candidate(effect, term, _resonances(term, evidence))
+    elif kind is laws.DryCompliance:
+        found = [(*place, d) for place in _resonances(term, evidence) for d in _coasting(evidence)]
+        yield Candidate(effect, term, np.array(found))
+    elif kind is laws.FrictionalLag:
+        along = [(np.arange(n) + 0.5) / n for n in _MEMORIES[: len(term.nonlinear)]]
+        yield Candidate(effect, term, Space([term], evidence).beta(_product(along)))
+    elif kind is laws.ElasticBacklash:
+        yield Candidate(effect, term, _gaps(term, evidence))
     elif kind is laws.PositionDependentInertia:
         stroke = evidence.limits.high - evidence.limits.low
         periods = stroke / np.concatenate([2.0 ** np.arange(-3, 0, 0.5), np.arange(1, 8, 0.25)])
@@ -201,11 +220,42 @@ def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
 _DAMPING = (0.05, 0.15, 0.45)
 
+# Times and widths of a bump that is late (a factor of 1.7 in either changes little), and exponents.
+_MEMORIES = (12, 8, 3)
+
+
+def _product(axes) -> np.ndarray:
+    """All combinations of values along several axes, `(G, d)`."""
+    return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+
+
+# A load's friction in parts of what its inertia asks for, where it shows at all.
+_COASTING = (0.2, 0.6, 2.0, 6.0)
+
+
+def _gaps(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
+    """Gaps and windups from what is crossed in a twentieth of the kernel's reach to the widest."""
+    low, high = Space([term], evidence).beta(np.array([[0.0] * 3, [1.0] * 3]))
+    least = 0.25 * _acceleration(evidence) * (evidence.reach / 20) ** 2
+    least = np.clip(least, low[0], 0.1 * high[0])
+    gaps, windups = (np.geomspace(least, high[0], n) for n in (10, 7))
+    return _product([gaps, windups, _coasting(evidence)])
+
+
+def _coasting(evidence: Evidence) -> np.ndarray:
+    return _acceleration(evidence) * np.array(_COASTING)
+
+
+def _acceleration(evidence: Evidence) -> float:
+    """98 % of the accelerations are below it, m/s²."""
+    velocity = np.asarray(evidence.motion.velocity)[: evidence.nodes]
+    return float(np.quantile(np.abs(np.diff(velocity)), 0.98)) * NODES / evidence.reach
+
 
 def _resonances(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     """Frequencies up to what the nodes still resolve, with a few dampings each."""
-    corners = Space([term], evidence).beta(np.array([[0.0, 0.0], [1.0, 1.0]]))
-    low, most = corners[:, 0]
+    count = len(term.nonlinear)
+    low, most = Space([term], evidence).beta(np.array([[0.0] * count, [1.0] * count]))[:, 0]
     high = max(min(most, 0.5 * NODES / evidence.reach), 2 * low)
     return np.array([(f, z) for z in _DAMPING for f in np.geomspace(low, high, GRID)])
 

@@ -145,27 +145,25 @@ RAREST = 1.5 / (1 + DRAWS)
 # is but the first order of its effect.
 OF_BASE = 0.002
 OF_BASE_ROUGH = 0.01
-# Isolated pushes besides another effect are mostly where that effect switches, and sharp terms take
-# what a strong effect leaves through the kernel.
+# Isolated pushes besides another effect are mostly where that effect switches, and terms on the
+# force's own derivatives take what a strong effect leaves through the kernel.
 EASY_OF_BASE = 0.05
+EASY = frozenset({"transport_delay", "actuator_lag", "compliance", "disturbance_pulses"})
+# Each of these is an idealisation of what happens about a reversal (one spring, friction without a
+# dip on the load): a third of its amplitude is no evidence for another of them.
+AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
+REVERSAL_OF_BASE = 0.1
 
 
 def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[Taken]):
     least = LATER_SHARE if taken else LEAST_SHARE
-    rough = any(t.trial.candidate.effect.first_order for t in taken)
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
         if taken:
-            name = finalist.trial.candidate.effect.name
-            easy = name in SHARP or name == "disturbance_pulses"
-            part = EASY_OF_BASE if easy else OF_BASE_ROUGH if rough else OF_BASE
-            enough &= gained >= part * base.energy
-            again = finalist.trial.candidate.lines is None and any(
-                isinstance(finalist.trial.candidate.term, type(term)) for term in now.terms[1:]
-            )
-            enough &= not again
+            enough &= gained >= _part_of_base(finalist, taken) * base.energy
+            enough &= not _again(finalist, taken)
         sharp = finalist.trial.candidate.effect.name in SHARP
         level = RAREST if sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
@@ -174,6 +172,26 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
             continue
         return finalist
     return None
+
+
+def _part_of_base(finalist: Finalist, taken: list[Taken]) -> float:
+    """The part of what the base left that a later term must account for."""
+    name, before = finalist.trial.candidate.effect.name, [t.trial.candidate.effect for t in taken]
+    parts = [OF_BASE]
+    if any(effect.first_order for effect in before):
+        parts.append(OF_BASE_ROUGH)
+    if name in EASY:
+        parts.append(EASY_OF_BASE)
+    if name in AT_REVERSALS and any(effect.name in AT_REVERSALS for effect in before):
+        parts.append(REVERSAL_OF_BASE)
+    return max(parts)
+
+
+def _again(finalist: Finalist, taken: list[Taken]) -> bool:
+    """Whether the effect has been taken already; of waves and end stops there may be several."""
+    own = finalist.trial.candidate
+    several = own.lines is not None or own.effect.name == "end_stop"
+    return not several and any(t.trial.candidate.effect.name == own.effect.name for t in taken)
 
 
 def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float) -> bool:

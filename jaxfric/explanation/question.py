@@ -105,4 +105,4 @@ def _lateness(views: list[Evidence], known: Fit) -> float:
     return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
 
 
-_SHARP_TERMS = (laws.TransportDelay, laws.ActuatorLag, laws.Compliance, laws.FrictionalLag)
+_SHARP_TERMS = (laws.TransportDelay, laws.ActuatorLag, laws.Compliance, laws.DryCompliance)

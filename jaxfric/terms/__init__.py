@@ -58,4 +58,9 @@ from .time import (
     PeriodicDisturbance as PeriodicDisturbance,
     ThermalDrift as ThermalDrift,
 )
-from .transmission import Backlash as Backlash, Compliance as Compliance
+from .transmission import (
+    Backlash as Backlash,
+    Compliance as Compliance,
+    DryCompliance as DryCompliance,
+    ElasticBacklash as ElasticBacklash,
+)

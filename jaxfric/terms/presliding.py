@@ -4,17 +4,19 @@ A term with a memory is a function of the whole recording, not of a sample, so i
 `simulate`, which asks terms about single states.
 """
 
+import dataclasses
 from abc import abstractmethod
 from typing import ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..recording import Recording
 from ..units import FORCE, POSITION, TIME, VELOCITY
 from .base import AbstractTerm, Parameter
+from .friction import AbstractBump, Gaussian
 
 UNKNOWN = float("nan")
 
@@ -59,9 +61,15 @@ def starts(recording: Recording) -> Array:
 
 
 def travel(recording: Recording) -> Float[Array, " N"]:
-    """Distance from the sample before, with its sign, m, `(N,)`; zero at a segment's start."""
-    velocity = recording.velocity
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * jnp.diff(recording.time)
+    """Distance from the sample before, with its sign, m, `(N,)`; zero at a segment's start.
+
+    Of the position where there is one: a derivative that is smoothed rounds off the very reversal.
+    """
+    velocity, position = recording.velocity, recording.position
+    if position is None:
+        steps = 0.5 * (velocity[1:] + velocity[:-1]) * jnp.diff(recording.time)
+    else:
+        steps = jnp.diff(position)
     return jnp.where(starts(recording), 0.0, jnp.pad(steps, (1, 0)))
 
 
@@ -146,24 +154,72 @@ def _memory_bounds(scales):
 
 
 class FrictionalLag(AbstractMemory):
-    """Friction that follows speed late: F = T sign(v) (abs f(t − τ) − abs f(t))/τ.
+    """A Stribeck bump that follows speed late: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
 
-    f is the channel `predicted_friction`, what the model says friction is, N. All of it τ late is
-    T = τ (Hess & Soom 1990: a few to tens of milliseconds); to first order only T shows, which is
-    why it is the parameter. `frictional_lag` T, s; `friction_memory` τ, s. Its constant part has
-    no rate and its viscous part is T F_v off the inertia, so the Stribeck curve alone shows it.
+    `bump` is g, in the steady state; constant and viscous friction have no memory (Armstrong-
+    Hélouvry, Dupont & Canudas de Wit 1994, section 2.4). `frictional_lag` τ, s, is the whole delay
+    of the memory: a dead time without `poles` (Hess & Soom 1990: a few to tens of milliseconds), so
+    many equal first-order lags otherwise. Through a reversal they differ: a filtered speed does not
+    vanish there, and the bump is not built up in full. To first order in τ only τ F_b shows.
     """
 
-    friction_memory: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = (Parameter("frictional_lag", TIME),)
-    nonlinear: ClassVar = (Parameter("friction_memory", TIME, _memory_bounds),)
-    coordinates: ClassVar = frozenset({"time", "velocity", "predicted_friction"})
+    frictional_lag: Float[Array, ""] | float = UNKNOWN
+    bump: AbstractBump = Gaussian()
+    poles: int = eqx.field(static=True, default=0)
+
+    @property
+    def affine(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        return self.bump.affine
+
+    @property
+    def nonlinear(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        return (Parameter("frictional_lag", TIME, _memory_bounds), *self.bump.nonlinear)
+
+    def beta(self) -> Float[Array, " d"]:
+        own = jnp.asarray(self.frictional_lag)[..., None]
+        return jnp.concatenate([own, self.bump.beta()], axis=-1)
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "FrictionalLag":
+        return dataclasses.replace(
+            self, frictional_lag=beta[..., 0], bump=self.bump.with_beta(beta[..., 1:])
+        )
 
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        begins, direction = starts(recording), jnp.sign(recording.velocity)
-        level = direction * recording.channels["predicted_friction"]
+        direction, speed = jnp.sign(recording.velocity), jnp.abs(recording.velocity)
+        least = jnp.finfo(speed.dtype).tiny
+        late = jnp.maximum(self._late(recording, speed), least)
+        change = self.bump.shape(late) - self.bump.shape(jnp.maximum(speed, least))
+        return (direction * change)[:, None]
+
+    def _late(self, recording, speed):
+        begins = starts(recording)
         steps = jnp.pad(jnp.diff(recording.time), (1, 0))
-        elapsed = jnp.cumsum(jnp.where(begins, 0.0, jnp.maximum(steps, 0.0)))
-        begin = jax.lax.cummax(jnp.where(begins, elapsed, 0.0))
-        late = jnp.interp(jnp.maximum(elapsed - self.friction_memory, begin), elapsed, level)
-        return (direction * (late - level) / self.friction_memory)[:, None]
+        steps = jnp.where(begins, 0.0, jnp.maximum(steps, 0.0))
+        if not self.poles:
+            elapsed = jnp.cumsum(steps)
+            begin = jax.lax.cummax(jnp.where(begins, elapsed, 0.0))
+            return jnp.interp(jnp.maximum(elapsed - self.frictional_lag, begin), elapsed, speed)
+        for _ in range(self.poles):
+            speed = low_pass(speed, steps * self.poles / self.frictional_lag, begins)
+        return speed
+
+
+def low_pass(
+    signal: Float[Array, " N"], steps: Float[Array, " N"], begins: Bool[Array, " N"]
+) -> Float[Array, " N"]:
+    """A first-order lag, exact for straight lines between samples; at rest where it `begins`.
+
+    `steps`: time since the sample before over the time constant, `(N,)`.
+    """
+    keep = jnp.where(begins, 0.0, jnp.exp(-steps))
+    long = steps > 1e-6
+    mean = jnp.where(long, -jnp.expm1(-steps) / jnp.where(long, steps, 1.0), 1.0 - 0.5 * steps)
+    before = jnp.pad(signal[:-1], (1, 0))
+    push = jnp.where(begins, signal, signal * (1 - mean) + before * (mean - keep))
+
+    def step(state, now):
+        share, gain = now
+        state = share * state + gain
+        return state, state
+
+    return jax.lax.scan(step, jnp.zeros_like(signal[0]), (keep, push), unroll=8)[1]

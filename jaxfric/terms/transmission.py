@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..recording import Recording
-from ..units import DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
+from ..units import ACCELERATION, DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
 from .base import Parameter
 from .presliding import AbstractMemory, starts
 
@@ -57,6 +57,108 @@ class Backlash(AbstractMemory):
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
         inside = 1 - play(recording, self.half_gap) ** 8
         return (-jnp.sign(recording.velocity) * inside)[:, None]
+
+
+def _windup_bounds(scales):
+    """From what a rigid flank is like to as much as the widest gap."""
+    low, high = _gap_bounds(scales)
+    return 0.1 * low, high
+
+
+def _coasting_bounds(scales):
+    """From a load that coasts for the whole record to one that stops within a sample."""
+    return scales.fastest / scales.duration, scales.fastest / scales.interval
+
+
+# Flanks in touch: a load that strikes them comes back with half its speed, as in steel gears.
+_FLANKS = 0.2
+
+
+class ElasticBacklash(AbstractMemory):
+    """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
+
+    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by ([`pushed`][]).
+    `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
+    is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
+    """
+
+    half_gap: Float[Array, ""] | float = UNKNOWN
+    windup: Float[Array, ""] | float = UNKNOWN
+    load_deceleration: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("backlash_force", FORCE),)
+    nonlinear: ClassVar = (
+        Parameter("half_gap", POSITION, _gap_bounds),
+        Parameter("windup", POSITION, _windup_bounds),
+        Parameter("load_deceleration", ACCELERATION, _coasting_bounds),
+    )
+    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return -recording.velocity[:, None] / self.load_deceleration
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        omega = jnp.sqrt(self.load_deceleration / self.windup)
+        push = pushed(recording, omega, _FLANKS, self.load_deceleration, self.half_gap)
+        return (push / self.load_deceleration - jnp.sign(recording.velocity))[:, None]
+
+
+# Steps between samples.
+_STEPS = 4
+
+
+def pushed(
+    recording: Recording,
+    omega: Float[Array, ""],
+    damping: Float[Array, ""] | float,
+    deceleration: Float[Array, ""],
+    half_gap: Float[Array, ""] | float = 0.0,
+) -> Float[Array, " N"]:
+    """What a load with dry friction is pushed by, per mass, m/s², `(N,)`.
+
+    ẅ = p − d sign(ẇ) and at rest it sticks; p = ω² (s ± δ) + 2ζω ds/dt beyond the dead zone of
+    ±`half_gap` δ, m, s the way by which the motor, at the recording's position, is ahead. Flanks of
+    a gap do not pull. `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s². Stepped semi-
+    implicitly, stable for any stiffness. A segment starts in slip.
+    """
+    begins, speed = starts(recording), recording.velocity
+    span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0))) / _STEPS
+    way = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.position), (1, 0))) / _STEPS
+    last = jnp.where(begins, speed, jnp.roll(speed, 1))
+    stiffness, drag = omega**2, 2 * damping * omega
+    gapless = isinstance(half_gap, float)
+
+    def substep(state, span, way, speed):
+        ahead, load = state
+        ahead = ahead + way - span * load
+        over = jnp.sign(ahead) * jnp.maximum(jnp.abs(ahead) - half_gap, 0.0)
+        push = stiffness * over + drag * (speed - load)
+        push = push if gapless else jnp.where(push * over > 0, push, 0.0)
+        push = push / (1 + span * drag + span**2 * stiffness)
+        free = load + span * push
+        left = jnp.maximum(jnp.abs(free) - span * deceleration, 0.0)
+        return (ahead, jnp.sign(free) * left), push
+
+    def step(state, now):
+        span, way, last, speed, begin = now
+        total = jnp.zeros_like(speed)
+        for number in range(_STEPS):
+            at = last + (number + 0.5) / _STEPS * (speed - last)
+            state, push = substep(state, span, way, at)
+            total = total + push / _STEPS
+        ahead, load = state
+        side = jnp.sign(speed)
+        wound = side * (half_gap + deceleration / stiffness)
+        state = jnp.where(begin, wound, ahead), jnp.where(begin, speed, load)
+        return state, jnp.where(begin, side * deceleration, total)
+
+    zero = jnp.zeros_like(speed[0])
+    push = jax.lax.scan(step, (zero, zero), (span, way, last, speed, begins))[1]
+    # Means over the spans before the samples; what is wanted belongs to the samples.
+    return 0.5 * (push + jnp.where(jnp.roll(begins, -1), push, jnp.roll(push, -1)))
 
 
 def _resonance_bounds(scales):
@@ -154,3 +256,31 @@ _DRIVES = {
     "friction": (_LOAD_FRICTION,),
     "both": (_LOAD_INERTIA, _LOAD_FRICTION),
 }
+
+
+class DryCompliance(AbstractMemory):
+    """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
+
+    M_L p is what the spring pushes the load by ([`pushed`][]): [`Compliance`][] for a load whose
+    friction lets it stick, M_L d of it. `load_inertia` M_L, kg; `load_resonance` ω/2π, Hz;
+    `damping_ratio` ζ; `load_deceleration` d, m/s².
+    """
+
+    load_resonance: Float[Array, ""] | float = UNKNOWN
+    damping_ratio: Float[Array, ""] | float = UNKNOWN
+    load_deceleration: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (_LOAD_INERTIA,)
+    nonlinear: ClassVar = (*Compliance.nonlinear, ElasticBacklash.nonlinear[2])
+    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return -recording.velocity[:, None]
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        omega = 2 * jnp.pi * self.load_resonance
+        push = pushed(recording, omega, self.damping_ratio, self.load_deceleration)
+        return (push - self.load_deceleration * jnp.sign(recording.velocity))[:, None]
