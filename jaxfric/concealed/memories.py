@@ -162,23 +162,37 @@ GAIN: Kind = Kind(
 
 def _draw_gap(rng, n, size):
     truth = {"load_share": rng.uniform(0.3, 0.6), "load_friction_share": rng.uniform(0.3, 0.8)}
-    truth["contact_rate"] = min(rng.uniform(6, 12) * n.bandwidth, 0.25 / n.substep)
+    truth["contact_rate"] = rng.uniform(6, 12) * n.bandwidth
     truth["backlash_force"] = truth["load_friction_share"] * n.coulomb
     return solved(BACKLASH, truth, n, size)
 
 
+def _flanks(truth, n):
+    """Flanks that give way by half the half-gap at most: beyond, it is a compliance that shows."""
+    reduced = _reduced(truth, n.mass)
+    stiff = np.sqrt(2 * truth["backlash_force"] / (truth["half_gap"] * reduced))
+    rate = min(max(truth["contact_rate"], stiff), 0.25 / n.substep)
+    windup = truth["backlash_force"] / (reduced * rate**2)
+    return truth | {"contact_rate": float(rate), "windup": float(windup)}
+
+
+def _reduced(truth, mass):
+    """Of both bodies swinging against each other, kg."""
+    return mass * truth["load_share"] * (1 - truth["load_share"])
+
+
 def _gap(truth, n):
-    inside = np.where(travelled(n) < 2 * truth["half_gap"], -1.0, 0.0)
+    crossing = (travelled(n) < 2 * truth["half_gap"]) & (n.way != 0)
+    inside = np.where(crossing, -1.0, 0.0)
     rigid = truth["load_share"] * n.mass * n.a
     return inside * (rigid + truth["load_friction_share"] * (n.u - n.mass * n.a))
 
 
 def _coupled(truth, base, rate, damping):
     """Spring and damper between the bodies, by the frequency with which they swing together."""
-    share = truth["load_share"]
-    reduced = base["mass"] * share * (1 - share)
+    reduced = _reduced(truth, base["mass"])
     return {
-        "load_share": share,
+        "load_share": truth["load_share"],
         "load_friction_share": truth["load_friction_share"],
         "stiffness": reduced * rate**2,
         "damping": 2 * damping * reduced * rate,
@@ -194,6 +208,8 @@ BACKLASH: Kind = Kind(
     lambda truth: f"within {2 * truth['half_gap']:.3g} after a reversal",
     tuned="half_gap",
     bounds=lambda n: (1e-5 * n.plan.stroke, 0.02 * n.plan.stroke),
+    complete=_flanks,
+    impacts=True,
 )
 
 

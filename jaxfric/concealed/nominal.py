@@ -62,7 +62,9 @@ class Kind(NamedTuple):
     `where(truth)`: a sentence. With `centred`, the size counts the deviation of the force from its
     mean only, since the baseline's constants take up the mean. Where the loop shapes the force too
     much for the set-point to tell its size, `tuned` names the parameter that is corrected by a
-    simulation, between `bounds(nominal)`; `complete` fills in what follows from it.
+    simulation, between `bounds(nominal)`; `complete` fills in what follows from it. With `impacts`,
+    the size is that of the mean over the loop's time constant, in motion: a blow is high and says
+    nothing, and at rest nobody knows on which flank the load lies.
     """
 
     draw: Callable[[Generator, Nominal, float], Truth]
@@ -73,6 +75,7 @@ class Kind(NamedTuple):
     tuned: str = ""
     bounds: Callable[[Nominal], tuple[float, float]] = _unbounded
     complete: Callable[[Truth, Nominal], Truth] = _as_it_is
+    impacts: bool = False
 
     def measure(self, truth: Truth, nominal: Nominal) -> float:
         """The size: root mean square of the force in parts of the Coulomb level."""

@@ -42,7 +42,7 @@ def _improved(machine, name, truth, n, size):
     first = truth[kind.tuned]
     tried = np.clip([first / _STEP, first * _STEP], low, high)
     truths = [kind.complete({**truth, kind.tuned: float(value)}, n) for value in tried]
-    sizes = _sizes(machine, name, truths)
+    sizes = _sizes(machine, name, truths, n)
     span = np.diff(np.log(tried))[0]
     # A size that does not grow with the parameter says nothing about where to look for more.
     slope = max(np.diff(np.log(sizes))[0] / span, 0.1)
@@ -54,7 +54,8 @@ def _improved(machine, name, truth, n, size):
     return better, between or wanted < low or wanted > high
 
 
-def _sizes(machine, name, truths):
+def _sizes(machine, name, truths, n):
+    """Of the effect's force in the closed loop, in parts of the Coulomb level."""
     kind = KINDS[name]
     twins = [
         dataclasses.replace(
@@ -66,6 +67,14 @@ def _sizes(machine, name, truths):
         for truth in truths
     ]
     found = simulate([(twin, 0) for twin in twins])
-    sizes = np.array([rms(each.hidden[name]) / machine.coulomb for each in found])
+    forces = [each.hidden[name] for each in found]
+    if kind.impacts:
+        window = max(round(n.plan.sample_rate / n.bandwidth), 1)
+        mean, still = np.full(window, 1 / window), machine.physics["still"]
+        forces = [
+            np.convolve(force, mean, "same") * (np.abs(each.true.velocity) > still)
+            for force, each in zip(forces, found, strict=True)
+        ]
+    sizes = np.array([rms(force) / machine.coulomb for force in forces])
     # A loop that bursts is too large an effect.
     return np.clip(np.nan_to_num(sizes, nan=np.inf), 1e-6, 1e3)
