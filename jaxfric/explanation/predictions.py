@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
+from ..terms import ActuatorDeadband
 from ..terms.base import Sum
 from .evidence import BATCH, NODES, Evidence, evaluate
 from .regression import Fit
@@ -28,11 +29,24 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
             other = other + alpha @ np.asarray(plain[0])
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving[0])
+    force = friction + other + rate(evidence, momentum)
+    if any(isinstance(term, ActuatorDeadband) for term in fit.terms):
+        force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(
-        predicted_force=friction + other + rate(evidence, momentum),
+        predicted_force=force,
         predicted_friction=friction,
         predicted_acceleration=rate(evidence, np.asarray(evidence.motion.velocity)),
     )
+
+
+def _crossing(force: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """A predicted force that passes through zero when its command does.
+
+    Across a dead-band the command jumps, and its sign is beyond doubt; the prediction's is not,
+    and a step at the wrong moment would make the band narrower than it is.
+    """
+    apart = np.sign(force) != np.sign(command)
+    return np.where(apart, np.finfo(float).tiny * np.sign(command), force)
 
 
 def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:

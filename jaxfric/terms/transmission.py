@@ -115,13 +115,13 @@ def pushed(
     omega: Float[Array, ""],
     damping: Float[Array, ""] | float,
     deceleration: Float[Array, ""],
-    half_gap: Float[Array, ""] | float = 0.0,
+    half_gap: Float[Array, ""] | float | None = None,
 ) -> Float[Array, " N"]:
     """What a load with dry friction is pushed by, per mass, m/s², `(N,)`.
 
-    ẅ = p − d sign(ẇ) and at rest it sticks; p = ω² (s ± δ) + 2ζω ds/dt beyond the dead zone of
-    ±`half_gap` δ, m, s the way by which the motor, at the recording's position, is ahead. Flanks of
-    a gap do not pull. `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s². Stepped semi-
+    For its speed w, dw/dt = p − d sign(w), and at rest it sticks. Without `half_gap` p = ω² s + 2ζω
+    ds/dt, s, m, the way by which the motor, at the recording's position, is ahead; with it, δ, the
+    spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s². Stepped semi-
     implicitly, stable for any stiffness. A segment starts in slip.
     """
     begins, speed = starts(recording), recording.velocity
@@ -129,14 +129,14 @@ def pushed(
     way = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.position), (1, 0))) / _STEPS
     last = jnp.where(begins, speed, jnp.roll(speed, 1))
     stiffness, drag = omega**2, 2 * damping * omega
-    gapless = isinstance(half_gap, float)
+    gap = 0.0 if half_gap is None else half_gap
 
     def substep(state, span, way, speed):
         ahead, load = state
         ahead = ahead + way - span * load
-        over = jnp.sign(ahead) * jnp.maximum(jnp.abs(ahead) - half_gap, 0.0)
+        over = jnp.sign(ahead) * jnp.maximum(jnp.abs(ahead) - gap, 0.0)
         push = stiffness * over + drag * (speed - load)
-        push = push if gapless else jnp.where(push * over > 0, push, 0.0)
+        push = push if half_gap is None else jnp.where(push * over > 0, push, 0.0)
         push = push / (1 + span * drag + span**2 * stiffness)
         free = load + span * push
         left = jnp.maximum(jnp.abs(free) - span * deceleration, 0.0)
@@ -151,7 +151,7 @@ def pushed(
             total = total + push / _STEPS
         ahead, load = state
         side = jnp.sign(speed)
-        wound = side * (half_gap + deceleration / stiffness)
+        wound = side * (gap + deceleration / stiffness)
         state = jnp.where(begin, wound, ahead), jnp.where(begin, speed, load)
         return state, jnp.where(begin, side * deceleration, total)
 
