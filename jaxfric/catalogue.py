@@ -25,7 +25,7 @@ class Effect(NamedTuple):
     - `shapes`: the terms that model it, each a rival of the others, from the [`Scales`][] of a
       recording (with values, outside jit); none where no term is missing.
     - `needs`: signals beside time, velocity and force that a recording must have.
-    - `first_order`: whether its terms are but the first order of the effect.
+    - `first_order`: whether its terms are but the first order of the effect, or one law of many.
     - `separate_by`: the experiment that tells it from the confusable ones.
     - `positive`: whether its affine parameters are magnitudes, so that a fit with another sign is
       something else (friction dissipates, a delay is late, a stop pushes back).
@@ -201,8 +201,9 @@ CATALOGUE = (
         "presliding",
         "F_p (z − sign v), dz = (dx/x_d)(1 − z sign(dx))",
         ("distance_since_reversal",),
-        ("backlash", "frictional_lag", "stribeck"),
+        ("backlash", "compliance", "frictional_lag", "stribeck"),
         _fixed(laws.Dahl()),
+        first_order=True,
         separate_by="Reverse slowly over a few micrometres: presliding is elastic before it slips.",
         positive=True,
     ),
@@ -232,7 +233,7 @@ CATALOGUE = (
         "compliance",
         "M_L r̈, r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v)",
         ("acceleration", "time_since_reversal"),
-        ("transport_delay", "actuator_lag", "backlash"),
+        ("transport_delay", "actuator_lag", "backlash", "presliding"),
         _fixed(
             *(laws.Compliance(driven=by) for by in ("inertia", "friction", "both")),
             laws.DryCompliance(),

@@ -127,19 +127,20 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
             if isinstance(term, laws.FrictionalLag):
                 term = dataclasses.replace(term, bump=_bump(base))
             found += list(_with_places(effect, term, evidence))
-    present = {type(t) for t in _leaves(base)}
-    return [c for c in found if not (set(map(type, _leaves(c.term))) <= present)]
+    present = {type(t) for t in leaves(base)}
+    return [c for c in found if not (set(map(type, leaves(c.term))) <= present)]
 
 
 def _bump(base: AbstractTerm) -> AbstractBump:
     """The kind of bump that the baseline has, or a Gaussian one."""
-    return next((t for t in _leaves(base) if isinstance(t, AbstractBump)), laws.Gaussian())
+    return next((t for t in leaves(base) if isinstance(t, AbstractBump)), laws.Gaussian())
 
 
-def _leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
+def leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
+    """The single terms of a sum, of those with a direction the positive one."""
     for part in summands(term):
         if isinstance(part, Directional):
-            yield from _leaves(part.positive)
+            yield from leaves(part.positive)
         else:
             yield part
 

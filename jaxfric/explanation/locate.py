@@ -12,7 +12,7 @@ import numpy as np
 from .candidates import Lines, line_frequencies, scaled
 from .chance import Judge, Scan, adjusted, blocks
 from .evidence import Evidence
-from .regression import Fit
+from .regression import Fit, fit
 
 # Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
 KNOTS = 12
@@ -83,6 +83,26 @@ def _place(name, raw, scan: Scan, p_value, peak, knots, now: Fit) -> Place:
         own = raw - basis @ (basis.T @ raw)
         curve = (knots, np.linalg.lstsq(own, now.residual, rcond=1e-3)[0])
     return Place(name, share, size, p_value, peak, curve)
+
+
+def repeats(place: Place, now: Fit, held: Evidence) -> bool:
+    """Whether a place's curve takes something off what a fit leaves of another recording.
+
+    The fit's parameters may move there; `held` with the fit's predictions. What belongs to the
+    moment, and lines, whose phase may be another, are not asked.
+    """
+    if place.coordinate.startswith("time_") or place.coordinate == "time":
+        return True
+    if not len(place.curve[0]):
+        return True
+    value, factor, kind = coordinates(held)[place.coordinate]
+    knots, heights = place.curve
+    curve = _hats(held, value, factor, kind, knots) @ heights
+    there = fit(now.terms, held, now.betas, 0)
+    basis = there.basis()
+    curve = curve - basis @ (basis.T @ curve)
+    left = there.residual - basis @ (basis.T @ there.residual)
+    return bool(np.sum((left - curve) ** 2) < np.sum(left**2))
 
 
 def coordinates(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:

@@ -4,11 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..terms import ElasticBacklash
 from ..terms.base import AbstractTerm
 from .candidates import Field
 from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
+from .plausible import plausible
 from .predictions import with_predictions
 from .regression import Fit, fit
 
@@ -36,13 +38,15 @@ class Named(NamedTuple):
     """The terms that the residual calls for, on top of the base.
 
     `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
-    contest for what remains.
+    contest for what remains; `smoothed`: what the kernel makes of the time by which the force is
+    late, where it is, s.
     """
 
     base: Fit
     last: Fit
     taken: list[Taken]
     left: Contest
+    smoothed: float = 0.0
 
     @property
     def rephased(self) -> frozenset[int]:
@@ -57,11 +61,12 @@ def search(
     structure: AbstractTerm,
     wide: Evidence | None = None,
     seed: int = 0,
+    refuted: frozenset[str] = frozenset(),
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
     **Arguments:** `wide`: the recording through a kernel of twice the width, where terms that act
-    on derivatives of the force must show alike.
+    on derivatives of the force must show alike; `refuted`: effects that are out of question.
     """
     now = base
     taken: list[Taken] = []
@@ -70,19 +75,44 @@ def search(
     visited: set[tuple[str, ...]] = set()
     while True:
         round_ = contest(evidence, now, field, seed)
+        machines = [
+            f
+            for f in round_.finalists
+            if f.trial.candidate.effect.name not in refuted and plausible(f, now, evidence)
+        ]
+        round_ = round_._replace(finalists=machines)
         best = _believed(round_, now, evidence, wide, base, taken)
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
             return Named(base, now, taken, round_)
         visited.add(names)
-        best, rivals = _rivals(best, round_, now, evidence)
+        best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
         taken.append(Taken(best.trial, rivals, best.p_value))
         terms = (*now.terms, best.trial.candidate.term)
         now = fit(terms, evidence, best.betas)
         evidence = with_predictions(evidence, now)
         now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
+
+
+# Of the idealisations of a reversal none is right to the last tenth of its score, and a law of
+# three nonlinear parameters finds that tenth in any of them: then the one with fewer is meant.
+NO_EVIDENCE = 0.9
+
+
+def _plainer(best: Finalist, round_: Contest) -> Finalist:
+    """The best, or an idealisation of the same with fewer parameters that does nearly as well."""
+
+    def meant(other: Finalist) -> bool:
+        name = other.trial.candidate.effect.name
+        known = name in AT_REVERSALS and name not in SHARP and other.p_value <= LEVEL
+        fewer = len(other.betas[-1]) < len(best.betas[-1])
+        return known and fewer and other.score >= NO_EVIDENCE * best.score
+
+    if best.trial.candidate.effect.name not in AT_REVERSALS:
+        return best
+    return next((other for other in round_.finalists if meant(other)), best)
 
 
 # Nor one whose force is the same but for 5 %: what noise, which is never quite as assumed, makes of
@@ -150,9 +180,9 @@ OF_BASE_ROUGH = 0.01
 EASY_OF_BASE = 0.05
 EASY = frozenset({"transport_delay", "actuator_lag", "compliance", "disturbance_pulses"})
 # Each of these is an idealisation of what happens about a reversal (one spring, friction without a
-# dip on the load): a third of its amplitude is no evidence for another of them.
+# dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
-REVERSAL_OF_BASE = 0.1
+REVERSAL_OF_BASE = 0.25
 
 
 def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[Taken]):
@@ -165,10 +195,11 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
             enough &= gained >= _part_of_base(finalist, taken) * base.energy
             enough &= not _again(finalist, taken)
         sharp = finalist.trial.candidate.effect.name in SHARP
+        dynamic = isinstance(finalist.trial.candidate.term, ElasticBacklash)
         level = RAREST if sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if sharp and not _confirmed(finalist, now, wide, least):
+        if (sharp or dynamic) and not _confirmed(finalist, now, wide, least):
             continue
         return finalist
     return None
@@ -182,7 +213,8 @@ def _part_of_base(finalist: Finalist, taken: list[Taken]) -> float:
         parts.append(OF_BASE_ROUGH)
     if name in EASY:
         parts.append(EASY_OF_BASE)
-    if name in AT_REVERSALS and any(effect.name in AT_REVERSALS for effect in before):
+    switching = name in AT_REVERSALS or name == "disturbance_pulses"
+    if switching and any(effect.name in AT_REVERSALS for effect in before):
         parts.append(REVERSAL_OF_BASE)
     return max(parts)
 

@@ -15,7 +15,7 @@ from .chance import LEVEL
 from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
-from .locate import Place, locate
+from .locate import Place, locate, repeats
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
@@ -43,13 +43,15 @@ def tell(
     force = float(np.sqrt(np.mean(evidence.target**2)))
     before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
     before = _through_wide(before, first, asked.wide, seed)
+    before = _lasting(before, first, asked)
     after = []
     if found.taken or wrong is not None:
         where, left = rest
         seen = with_predictions(where.evidence, left.last)
         after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
         after = _through_wide(after, left.last, where.wide, seed)
-    findings = _findings(found, asked, first, units)
+        after = _lasting(after, left.last, where)
+    findings = _findings(found, asked, rest, first, units)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
@@ -108,6 +110,21 @@ def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) ->
     return [place for place in places if sure or place.coordinate != "force_rate"]
 
 
+def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
+    """The places that the held-out recording shows too, and no slow part of the noise.
+
+    Every axis has a load that wanders: one that is slow beside the kernel but no larger than what
+    differs from row to row is the same noise.
+    """
+    floor = verification.noise(now, asked.evidence.target)
+    floor *= float(np.sqrt(np.mean(asked.evidence.target**2)))
+    places = [p for p in places if p.coordinate != "time" or p.size > floor]
+    if asked.held is None:
+        return places
+    held = with_predictions(asked.held, now)
+    return [place for place in places if repeats(place, now, held)]
+
+
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
 # part; of four times its size, sixteen times the power, something is missing, wherever.
 ROUGH = 4.0
@@ -129,10 +146,10 @@ def _verdict(named: bool, before: list[Place], after: list[Place], rough: bool) 
     return "unexplained" if before or rough else "consistent"
 
 
-def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]:
+def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Finding]:
     seen = with_predictions(asked.evidence, found.last)
     start = len(found.last.terms) - len(found.taken)
-    values = _with_smoothing(found.last, asked, units)[start:]
+    values = _with_smoothing(found, asked, rest, units)[start:]
     findings = []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
@@ -164,18 +181,30 @@ def _findings(found: Named, asked: Question, first: Fit, units) -> list[Finding]
     return sorted(findings, key=lambda finding: -finding.share)
 
 
-def _with_smoothing(now: Fit, asked: Question, units) -> list[dict[str, Estimate]]:
+def _with_smoothing(found: Named, asked: Question, rest, units) -> list[dict[str, Estimate]]:
     """The parameters of each term; their errors contain what a kernel of twice the width changes.
 
-    A time by which the force is late was found by other means.
+    Where the force acts late, that is seen on the recording with the force put back, `rest`, by
+    all terms but the last, which is the delay or lag itself.
     """
+    now = found.last
     ours = spelled.estimates(now, asked.block, units)
-    if asked.wide is None or any(isinstance(term, LATE) for term in now.terms):
+    where, left = rest if isinstance(now.terms[-1], LATE) else (asked, found)
+    if where.wide is None:
         return ours
-    again = fit(now.terms, with_predictions(asked.wide, now), now.betas, 4)
-    block = np.linspace(0, asked.block[-1] + 1, len(asked.wide.rows), endpoint=False).astype(int)
+    known = left.last
+    again = fit(known.terms, with_predictions(where.wide, known), known.betas, 4)
+    block = np.linspace(0, where.block[-1] + 1, len(where.wide.rows), endpoint=False).astype(int)
     wide = spelled.estimates(again, block, units)
-    return [spelled.with_smoothing(*pair) for pair in zip(ours, wide, strict=True)]
+    both = [spelled.with_smoothing(*pair) for pair in zip(ours, wide, strict=False)]
+    late = [
+        {
+            name: own._replace(standard_error=np.hypot(own.standard_error, found.smoothed))
+            for name, own in term.items()
+        }
+        for term in ours[len(both) :]
+    ]
+    return both + late
 
 
 def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list[dict[str, Any]]:

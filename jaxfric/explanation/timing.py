@@ -31,13 +31,15 @@ TRIED = np.geomspace(0.6, 1.7, 9)
 class Late(NamedTuple):
     """A force that acts late: the effect's name, its time, s, and how to undo it.
 
-    `place`: of its term in the fit; `taken`: what was found, under its right name.
+    `place`: of its term in the fit; `taken`: what was found, under its right name; `smoothed`:
+    what the kernel's smoothing makes of the time, s.
     """
 
     time: float
     undo: Callable[[Recording, float], Recording]
     place: int
     taken: Taken
+    smoothed: float
 
     def undone(self, recording: Recording) -> Recording:
         """The recording with its force where it belongs."""
@@ -56,7 +58,10 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
         return None
     motion = from_position(recording)
     ways = {"transport_delay": _earlier, "actuator_lag": _lagged}
-    least = {name: _least(undo, motion, asked, found, place, guess) for name, undo in ways.items()}
+    width = asked.evidence.width
+    least = {
+        name: _least(undo, motion, asked, found, place, guess, width) for name, undo in ways.items()
+    }
     size = found.left.size
     gap = 0.5 * size * np.log(least["actuator_lag"][0] / least["transport_delay"][0])
     best = "transport_delay" if gap > 0 else "actuator_lag"
@@ -65,7 +70,13 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
     rivals = tuple(r for r in taken.rivals if r not in ways)
     if abs(gap) < RIVAL:
         rivals = (other, *rivals)
-    return Late(least[best][1], ways[best], place, _renamed(taken, best, rivals))
+    time = least[best][1]
+    wide = time
+    if asked.wide is not None:
+        wide = _least(ways[best], motion, asked, found, place, time, 2 * width)[1]
+    # By Richardson's rule, as in `parameters.with_smoothing`.
+    smoothed = abs(wide - time) / 3
+    return Late(time, ways[best], place, _renamed(taken, best, rivals), smoothed)
 
 
 def _renamed(taken: Taken, name: str, rivals: tuple[str, ...]) -> Taken:
@@ -97,7 +108,9 @@ def settled(
     now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
     seen = with_predictions(there.evidence, behind.last)
     rest = behind._replace(last=fit(terms[:-1], seen, now.betas[:-1], 6), taken=others)
-    return found._replace(last=now, taken=[*others, lateness.taken], left=behind.left), rest
+    taken = [*others, lateness.taken]
+    found = found._replace(last=now, taken=taken, left=behind.left, smoothed=lateness.smoothed)
+    return found, rest
 
 
 def _but(items: Sequence, place: int) -> list:
@@ -105,9 +118,9 @@ def _but(items: Sequence, place: int) -> list:
     return [item for i, item in enumerate(items) if i != place]
 
 
-def _least(undo: Callable, motion, asked, found, place, guess) -> tuple[float, float]:
+def _least(undo: Callable, motion, asked, found, place, guess, width) -> tuple[float, float]:
     """The least energy over the times tried, per unit of force noise, and the time there."""
-    energies = [_energy(undo, motion, asked, found, place, guess * part) for part in TRIED]
+    energies = [_energy(undo, motion, asked, found, place, guess * part, width) for part in TRIED]
     i = int(np.clip(np.argmin(energies), 1, len(TRIED) - 2))
     bend = np.polyfit(np.log(TRIED[i - 1 : i + 2]), np.log(energies[i - 1 : i + 2]), 2)
     if bend[0] <= 0:
@@ -116,9 +129,8 @@ def _least(undo: Callable, motion, asked, found, place, guess) -> tuple[float, f
     return float(np.exp(np.polyval(bend, at))), float(guess * np.exp(at))
 
 
-def _energy(undo, motion, asked: Question, found: Named, place: int, time: float) -> float:
+def _energy(undo, motion, asked: Question, found: Named, place: int, time, width) -> float:
     keep = [i for i in range(len(found.last.terms)) if i != place]
-    width = asked.evidence.width
     view = gather(undo(motion, time), width, asked.delay, asked.reversals)
     terms, betas = [found.last.terms[i] for i in keep], [found.last.betas[i] for i in keep]
     now = fit(terms, with_predictions(view, found.last), betas, 3)

@@ -121,8 +121,9 @@ def pushed(
 
     For its speed w, dw/dt = p − d sign(w), and at rest it sticks. Without `half_gap` p = ω² s + 2ζω
     ds/dt, s, m, the way by which the motor, at the recording's position, is ahead; with it, δ, the
-    spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s². Stepped semi-
-    implicitly, stable for any stiffness. A segment starts in slip.
+    spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s; `damping` ζ;
+    `deceleration` d, m/s². Stepped semi-implicitly, stable for any stiffness. A segment starts in
+    slip.
     """
     begins, speed = starts(recording), recording.velocity
     span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0))) / _STEPS
