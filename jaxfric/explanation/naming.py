@@ -12,7 +12,7 @@ from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .plausible import plausible
 from .predictions import with_predictions
-from .regression import Fit, fit
+from .regression import Fit, fast, fit
 
 # A term is believed if it accounts for this much of the mean-square residual, too: below it, the
 # amplitude is under a sixth of the residual's, where held forces, counts and smoothed velocities
@@ -191,6 +191,9 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
+        if finalist.trial.candidate.effect.name == "load_drift":
+            # Every axis has a load that wanders; no larger than the noise it is a part of it.
+            enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
             enough &= gained >= _part_of_base(finalist, taken) * base.energy
             enough &= not _again(finalist, taken)

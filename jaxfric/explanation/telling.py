@@ -19,7 +19,7 @@ from .locate import Place, locate, repeats
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
-from .regression import Fit, fit
+from .regression import Fit, fast, fit
 from .sentences import mismatch_sentence, sentence
 from .timing import LATE
 
@@ -116,9 +116,7 @@ def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
     Every axis has a load that wanders: one that is slow beside the kernel but no larger than what
     differs from row to row is the same noise.
     """
-    floor = verification.noise(now, asked.evidence.target)
-    floor *= float(np.sqrt(np.mean(asked.evidence.target**2)))
-    places = [p for p in places if p.coordinate != "time" or p.size > floor]
+    places = [p for p in places if p.coordinate != "time" or p.size > fast(now)]
     if asked.held is None:
         return places
     held = with_predictions(asked.held, now)
@@ -153,6 +151,8 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
     findings = []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
+        if "step_time" in parameters:
+            parameters = _dated(parameters, asked.evidence)
         less = verification.without(found, seen, number)
         share = (less.energy - found.last.energy) / first.energy
         held = None
@@ -205,6 +205,16 @@ def _with_smoothing(found: Named, asked: Question, rest, units) -> list[dict[str
         for term in ours[len(both) :]
     ]
     return both + late
+
+
+def _dated(parameters: dict[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
+    """A step lies somewhere between two rows, a kernel wide each; at rest they are far apart."""
+    own = parameters["step_time"]
+    times = np.asarray(evidence.motion.time)[evidence.centre]
+    after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
+    width = times[after] - times[after - 1] + evidence.reach
+    error = np.hypot(own.standard_error, width / np.sqrt(12))
+    return parameters | {"step_time": own._replace(standard_error=np.float64(error))}
 
 
 def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list[dict[str, Any]]:

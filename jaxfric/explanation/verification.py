@@ -7,7 +7,7 @@ from .contest import Contest
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
-from .regression import Fit, fit
+from .regression import Fit, fast, fit
 
 # What belongs to a moment of one recording says nothing about another.
 _MOMENTARY = (
@@ -118,14 +118,8 @@ def _both(less: Fit, more: Fit, evidence: Evidence, rephased) -> tuple[np.ndarra
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:
-    """The part of the force error that no model could remove, from neighbouring rows' differences.
-
-    Rows four apart share no samples; what differs between them is noise and what changes faster
-    than the kernel (von Neumann 1941).
-    """
-    differences = now.residual[4:] - now.residual[:-4]
-    level = np.median(np.abs(differences)) / 0.6745 / np.sqrt(2)
-    return float(level / np.sqrt(np.mean(reference**2)))
+    """The part of the force error that no model could remove, by [`fast`][]."""
+    return fast(now) / float(np.sqrt(np.mean(reference**2)))
 
 
 def smallest_visible(contest: Contest, now: Fit) -> dict[str, float]:
