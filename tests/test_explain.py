@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import types
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +11,19 @@ import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.effects import EFFECTS
-from jaxfric.explanation import candidates, evidence, explain, naming, pulses, question, telling
+from jaxfric.explanation import (
+    candidates,
+    evidence,
+    explain,
+    locate,
+    naming,
+    plausible,
+    predictions,
+    pulses,
+    question,
+    regression,
+    telling,
+)
 from jaxfric.explanation.sentences import sentence
 from jaxfric.uncertainty import Estimate
 
@@ -65,6 +78,8 @@ def planted(recording, term, alpha, beta=()):
     smooth = np.convolve(v, np.hanning(41) / np.hanning(41).sum(), "same")
     motion = dataclasses.replace(recording, velocity=jnp.asarray(smooth))
     force = np.asarray(known.columns(motion)) @ np.asarray(alpha)
+    if known.inertial:
+        force = force + np.gradient(np.asarray(known.momentum(motion)) @ np.asarray(alpha), TIME)
     return dataclasses.replace(recording, force=recording.force + force)
 
 
@@ -74,7 +89,9 @@ CASES = {
     "sticky_spot": (terms.StickySpot(), (6.0,), (0.02, 0.005)),
     "friction_step": (terms.FrictionStep(), (3.0,), (9.0,)),
     "periodic_disturbance": (terms.PeriodicDisturbance(), (2.0, -1.0), (6.3,)),
+    "frictional_lag": (terms.FrictionalLag(poles=1), (6.0,), (0.03, 0.06)),
 }
+LOAD = terms.DryCompliance(8.0, 0.2, 2.0)
 
 
 def test_nothing_is_missing_where_nothing_is(healthy):
@@ -242,3 +259,83 @@ def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
     text = sentence("asymmetric_friction", parameters, 0.45, ())
     assert "-38.9 N·s/m ± 3.2 N·s/m with speed" in text
     assert "0.0369" not in text and "cannot tell" in text
+
+
+def finalist(term):
+    """A candidate of that term, at the nonlinear parameters that it has, beside the base."""
+    trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
+    return types.SimpleNamespace(trial=trial, betas=None), np.asarray(term.beta())
+
+
+@pytest.mark.parametrize(("inertia", "is_one"), [(1.0, True), (12.0, False)])
+def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
+    run = planted(healthy[0], LOAD, (inertia,))
+    asked = question.ask(run, None, models.named("gaussian"))
+    load, beta = finalist(LOAD)
+    load.betas = (*asked.base.betas, beta)
+    assert plausible.plausible(load, asked.base, asked.evidence) is is_one
+
+
+def test_what_lags_is_a_curve_that_is_there(healthy):
+    lag, _ = finalist(terms.FrictionalLag(0.02, terms.Gaussian(0.05)))
+    for name, there in (("gaussian", True), ("coulomb-viscous", False)):
+        asked = question.ask(healthy[0], None, models.named(name))
+        assert plausible.plausible(lag, asked.base, asked.evidence) is there
+
+
+def test_a_load_that_rests_is_a_spring_to_the_ground(healthy):
+    asked = question.ask(healthy[0], None, models.named("gaussian"))
+    load, beta = finalist(terms.DryCompliance(0.5, 0.2, 2.0))
+    load.betas = (*asked.base.betas, beta)
+    assert not plausible.plausible(load, asked.base, asked.evidence)
+
+
+def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
+    term, alpha, beta = CASES["sticky_spot"]
+    run = planted(healthy[0], term, alpha, beta)
+    structure = models.named("gaussian")
+    for held, there in ((planted(healthy[1], term, alpha, beta), True), (healthy[1], False)):
+        asked = question.ask(run, held, structure)
+        seen = predictions.with_predictions(asked.evidence, asked.base)
+        places = {place.coordinate: place for place in locate.locate(seen, asked.base)}
+        spot = places["position_by_direction"]
+        assert spot.p_value <= 0.01 and spot.share > 0.1
+        assert (telling._lasting([spot], asked.base, asked) == [spot]) is there
+
+
+def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
+    asked = question.ask(healthy[0], None, models.named("gaussian"))
+    floor = regression.fast(asked.base)
+    empty = (np.zeros(0), np.zeros(0))
+    wandering = [locate.Place("time", 0.2, f * floor, 0.002, np.nan, empty) for f in (0.9, 1.1)]
+    assert telling._lasting(wandering, asked.base, asked) == wandering[1:]
+
+
+def test_what_was_refuted_is_not_named_again(healthy):
+    term, alpha, beta = CASES["cogging"]
+    asked = question.ask(planted(healthy[0], term, alpha, beta), None, models.named("gaussian"))
+    plain, other = (
+        naming.search(asked.evidence, asked.base, asked.structure, refuted=frozenset(names))
+        for names in ((), ("cogging",))
+    )
+    names = [
+        [taken.trial.candidate.effect.name for taken in found.taken] for found in (plain, other)
+    ]
+    assert names[0] == ["cogging"] and "cogging" not in names[1]
+
+
+def test_a_dead_band_is_crossed_when_the_command_crosses():
+    force = np.array([3.0, 0.2, 0.1, -0.1, -2.0, 0.0])
+    command = np.array([4.0, 1.2, -0.9, -1.1, -3.0, 1.0])
+    found = predictions._crossing(force, command)
+    np.testing.assert_array_equal(np.sign(found), np.sign(command))
+    np.testing.assert_allclose(found, [3.0, 0.2, 0.0, -0.1, -2.0, 0.0], atol=1e-300)
+
+
+def test_a_step_is_dated_between_two_rows(healthy):
+    seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
+    times = np.asarray(seen.motion.time)[seen.centre]
+    widest = int(np.argmax(np.diff(times)))
+    middle = Estimate(np.float64(times[widest : widest + 2].mean()), np.float64(1e-6), "s")
+    found = telling._dated({"step_time": middle}, seen)["step_time"].standard_error
+    assert found == pytest.approx((np.diff(times)[widest] + seen.reach) / np.sqrt(12))
