@@ -339,3 +339,13 @@ def test_a_step_is_dated_between_two_rows(healthy):
     middle = Estimate(np.float64(times[widest : widest + 2].mean()), np.float64(1e-6), "s")
     found = telling._dated({"step_time": middle}, seen)["step_time"].standard_error
     assert found == pytest.approx((np.diff(times)[widest] + seen.reach) / np.sqrt(12))
+
+
+def test_terms_that_share_what_they_remove_stand_in_for_another():
+    def found(*shares):
+        return [types.SimpleNamespace(share=share) for share in shares]
+
+    assert telling._stand_ins(found(0.2, 0.2, 0.1), 0.7)
+    assert not telling._stand_ins(found(0.4, 0.2, 0.05), 0.7)
+    # Two effects may overlap: a strong excitation of one is seldom orthogonal to the other.
+    assert not telling._stand_ins(found(0.3, 0.1), 0.9)

@@ -13,7 +13,7 @@ SCHEMA = "jaxfric.explanation/1"
 VERDICTS = {
     "consistent": "Nothing is missing: what the model leaves is no more than noise.",
     "explained": "The named physics accounts for what the model leaves out.",
-    "partly_explained": "Named physics accounts for a part; structure is left over.",
+    "partly_explained": "Named physics accounts for a part; structure is left, or terms overlap.",
     "unexplained": "Something is missing that no effect of the library accounts for.",
 }
 

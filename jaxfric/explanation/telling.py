@@ -52,6 +52,7 @@ def tell(
         after = _through_wide(after, left.last, where.wide, seed)
         after = _lasting(after, left.last, where)
     findings = _findings(found, asked, rest, first, units)
+    standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
@@ -60,7 +61,7 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     return Explanation(
-        verdict=_verdict(bool(findings), before, after, _rough(*rest, found.base)),
+        verdict=_verdict(findings, before, after, _rough(*rest, found.base), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(asked, first, *rest),
@@ -138,9 +139,21 @@ def _rough(asked: Question, found: Named, base: Fit) -> bool:
     return error > (HALF_ROUGH if most else ROUGH) * floor and error > LINEARITY
 
 
-def _verdict(named: bool, before: list[Place], after: list[Place], rough: bool) -> str:
-    if named:
-        return "partly_explained" if after or rough else "explained"
+# Of two effects that are there each has a part of its own; of three or more that share a quarter of
+# what they account for, none can claim it: they stand in for one that the library does not have.
+STAND_INS = 3
+CLAIMED = 0.75
+
+
+def _stand_ins(findings: list[Finding], removed: float) -> bool:
+    """Whether many findings share what they remove of the mismatch, instead of adding up to it."""
+    claimed = sum(max(finding.share, 0.0) for finding in findings)
+    return len(findings) >= STAND_INS and claimed < CLAIMED * removed
+
+
+def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool) -> str:
+    if findings:
+        return "partly_explained" if after or rough or standing else "explained"
     return "unexplained" if before or rough else "consistent"
 
 

@@ -17,7 +17,7 @@ _VERDICTS = {
     "partly_explained": (
         "Partly explained",
         "#b26a00",
-        "Named physics accounts for a part; structure is left over.",
+        "Named physics accounts for a part; structure is left, or terms overlap.",
     ),
     "unexplained": (
         "Unexplained",
