@@ -241,8 +241,9 @@ def _swinging(truth, n):
 
 
 def _compliant(truth, base):
-    rate = 1 / (truth["time_constant"] * np.sqrt(1 - truth["load_share"]))
-    return _coupled(truth, base, rate, truth["damping_ratio"])
+    # Both bodies swing faster than the load against a held motor, whose damping ratio is drawn.
+    faster = 1 / np.sqrt(1 - truth["load_share"])
+    return _coupled(truth, base, faster / truth["time_constant"], truth["damping_ratio"] * faster)
 
 
 COMPLIANCE: Kind = Kind(

@@ -1,9 +1,11 @@
 """Which physics the residual calls for: the winner of a contest joins, and all are refitted."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from ..catalogue import Effect
 from ..terms import ElasticBacklash
 from ..terms.base import AbstractTerm
 from .candidates import Field
@@ -38,8 +40,8 @@ class Named(NamedTuple):
     """The terms that the residual calls for, on top of the base.
 
     `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
-    contest for what remains; `smoothed`: what the kernel makes of the time by which the force is
-    late, where it is, s.
+    contest for what remains; `smoothed`: what kernel and sampling make of the time by which the
+    force is late, where it is, s.
     """
 
     base: Fit
@@ -195,7 +197,9 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
             # Every axis has a load that wanders; no larger than the noise it is a part of it.
             enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
-            enough &= gained >= _part_of_base(finalist, taken) * base.energy
+            before = [t.trial.candidate.effect for t in taken]
+            part = part_of_base(finalist.trial.candidate.effect, before)
+            enough &= gained >= part * base.energy
             enough &= not _again(finalist, taken)
         sharp = finalist.trial.candidate.effect.name in SHARP
         dynamic = isinstance(finalist.trial.candidate.term, ElasticBacklash)
@@ -208,16 +212,16 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
     return None
 
 
-def _part_of_base(finalist: Finalist, taken: list[Taken]) -> float:
+def part_of_base(effect: Effect, before: Sequence[Effect]) -> float:
     """The part of what the base left that a later term must account for."""
-    name, before = finalist.trial.candidate.effect.name, [t.trial.candidate.effect for t in taken]
+    name = effect.name
     parts = [OF_BASE]
-    if any(effect.first_order for effect in before):
+    if any(earlier.first_order for earlier in before):
         parts.append(OF_BASE_ROUGH)
     if name in EASY:
         parts.append(EASY_OF_BASE)
     switching = name in AT_REVERSALS or name == "disturbance_pulses"
-    if switching and any(effect.name in AT_REVERSALS for effect in before):
+    if switching and any(earlier.name in AT_REVERSALS for earlier in before):
         parts.append(REVERSAL_OF_BASE)
     return max(parts)
 

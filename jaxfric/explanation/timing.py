@@ -18,7 +18,7 @@ from ..recording import Recording
 from .candidates import Candidate
 from .contest import RIVAL
 from .evidence import gather
-from .naming import OF_BASE, Named, Taken
+from .naming import Named, Taken, part_of_base
 from .predictions import with_predictions
 from .question import Question, from_position
 from .regression import fit
@@ -32,7 +32,7 @@ class Late(NamedTuple):
     """A force that acts late: the effect's name, its time, s, and how to undo it.
 
     `place`: of its term in the fit; `taken`: what was found, under its right name; `smoothed`:
-    what the kernel's smoothing makes of the time, s.
+    what the kernel's smoothing and the sampling make of the time, s.
     """
 
     time: float
@@ -74,8 +74,9 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
     wide = time
     if asked.wide is not None:
         wide = _least(ways[best], motion, asked, found, place, time, 2 * width)[1]
-    # By Richardson's rule, as in `parameters.with_smoothing`.
-    smoothed = abs(wide - time) / 3
+    # By Richardson's rule, as in `parameters.with_smoothing`; and nobody wrote down when in its
+    # period a sample of the force was taken.
+    smoothed = float(np.hypot((wide - time) / 3, asked.evidence.limits.interval / np.sqrt(12)))
     return Late(time, ways[best], place, _renamed(taken, best, rivals), smoothed)
 
 
@@ -95,19 +96,21 @@ def settled(
     """
     others = [t for t in behind.taken if not isinstance(t.trial.candidate.term, LATE)]
     kept = [i for i, term in enumerate(behind.last.terms) if not isinstance(term, LATE)]
-    terms = [*(behind.last.terms[i] for i in kept), lateness.taken.trial.candidate.term]
-    betas = [*(behind.last.betas[i] for i in kept), np.zeros(0)]
-    evidence = with_predictions(asked.evidence, behind.last)
-    now = fit(terms, evidence, betas, 6)
-    for number in reversed(range(len(others))):
-        place = len(terms) - 1 - len(others) + number
-        less = fit(_but(terms, place), evidence, _but(now.betas, place), 6)
-        # As for any later term: a part of what the baseline left, not only of what is left now.
-        if less.energy - now.energy < OF_BASE * found.base.energy:
-            terms, others, now = _but(terms, place), _but(others, number), less
-    now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
     seen = with_predictions(there.evidence, behind.last)
-    rest = behind._replace(last=fit(terms[:-1], seen, now.betas[:-1], 6), taken=others)
+    left = fit([behind.last.terms[i] for i in kept], seen, [behind.last.betas[i] for i in kept], 6)
+    known = lateness.taken.trial.candidate
+    for number in reversed(range(len(others))):
+        place = len(left.terms) - len(others) + number
+        less = fit(_but(left.terms, place), seen, _but(left.betas, place), 6)
+        # As for any later term: a part of what the baseline left, not only of what is left now.
+        before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
+        part = part_of_base(others[number].trial.candidate.effect, before)
+        if less.energy - left.energy < part * found.base.energy:
+            left, others = less, _but(others, number)
+    evidence = with_predictions(asked.evidence, left)
+    now = fit((*left.terms, known.term), evidence, [*left.betas, np.zeros(0)], 6)
+    now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
+    rest = behind._replace(last=left, taken=others)
     taken = [*others, lateness.taken]
     found = found._replace(last=now, taken=taken, left=behind.left, smoothed=lateness.smoothed)
     return found, rest
