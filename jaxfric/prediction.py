@@ -62,14 +62,12 @@ def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Arr
 
 
 def with_channels(model: Model, recording: Recording) -> Recording:
-    """A prepared recording with the channels `predicted_…` that some terms of the model read.
+    """A prepared recording with the channel `predicted_force`, if terms of the model read it.
 
-    Faults of the actuator act on the force f that the motion needs, which the terms without faults
-    predict: `predicted_force`, N; `predicted_friction`, the part of it that depends on velocity
-    alone, N. Channels that are there already stay.
+    Faults of the actuator act on the force f that the motion needs, N, which the terms without
+    faults predict. A channel that is there already stays.
     """
-    read = {name for name in model.term.coordinates if name.startswith("predicted_")}
-    if not read - set(recording.channels):
+    if "predicted_force" not in model.term.coordinates - set(recording.channels):
         return recording
     sound = model.without("predicted_")
     span = signals.kernel_half_width(recording) * signals.interval(recording)
@@ -78,11 +76,9 @@ def with_channels(model: Model, recording: Recording) -> Recording:
     def rate(signal):
         return signals.local_quadratic(recording, signal, span, reach)[1]
 
-    made = {
-        "predicted_force": sound.force(recording) + rate(sound.momentum(recording)),
-        "predicted_friction": sound.friction(recording.velocity),
-    }
-    return dataclasses.replace(recording, channels=made | recording.channels)
+    force = sound.force(recording) + rate(sound.momentum(recording))
+    channels = recording.channels | {"predicted_force": force}
+    return dataclasses.replace(recording, channels=channels)
 
 
 def relative_error(

@@ -82,7 +82,6 @@ def motion(force=1.0, position=1.0, count=12):
     v[4] = 0.0
     channels = {
         "predicted_force": force * 30 * np.sin(2 * t + 1),
-        "predicted_friction": force * (20 * np.sign(v) + 60 / position * v),
         "neighbour_velocity": position * 0.1 * np.sin(2 * t),
         "load": force * (5 + np.sin(t)),
     }
@@ -484,7 +483,6 @@ def with_predictions(run, model):
     other = 0.1 * np.sin(2 * np.pi * 0.47 * np.asarray(run.time))
     channels = {
         "predicted_force": inertia * acceleration + friction,
-        "predicted_friction": friction + 8 * np.sign(v) * np.exp(-((v / 0.02) ** 2)),
         "neighbour_velocity": other,
         "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
     }

@@ -114,7 +114,7 @@ def scaled(raw: np.ndarray) -> np.ndarray:
 def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     """Every term of the catalogue that this recording has the signals for."""
     limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
-    have = {"predicted_force", "predicted_friction", *evidence.motion.channels}
+    have = {"predicted_force", *evidence.motion.channels}
     if evidence.motion.position is not None:
         have.add("position")
     found = []

@@ -4,7 +4,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..terms import ActuatorDeadband
-from ..terms.base import Sum
 from .evidence import BATCH, NODES, Evidence, evaluate
 from .regression import Fit
 
@@ -13,28 +12,23 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """The evidence with the channels that some terms read, at the nodes.
 
     `predicted_force` û, N (the measured force in its place would explain itself);
-    `predicted_friction`, what of it depends on velocity alone, N; `predicted_acceleration`, m/s².
+    `predicted_acceleration`, m/s².
     """
-    count = evidence.motion.num_samples
-    friction, other, momentum = np.zeros(count), np.zeros(count), np.zeros(count)
+    force, momentum = np.zeros((2, evidence.motion.num_samples))
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if any(name.startswith("predicted_") for name in term.coordinates):
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
             term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
         )
-        if isinstance(term, Sum) or term.coordinates <= {"velocity"}:
-            friction = friction + alpha @ np.asarray(plain[0])
-        else:
-            other = other + alpha @ np.asarray(plain[0])
+        force = force + alpha @ np.asarray(plain[0])
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving[0])
-    force = friction + other + rate(evidence, momentum)
+    force = force + rate(evidence, momentum)
     if any(isinstance(term, ActuatorDeadband) for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(
         predicted_force=force,
-        predicted_friction=friction,
         predicted_acceleration=rate(evidence, np.asarray(evidence.motion.velocity)),
     )
 
