@@ -126,12 +126,13 @@ def detail(name: str) -> str:
 
 
 def _richest(shapes: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Shapes without those that another one of the same law contains, as fewer harmonics."""
+    """Shapes without those that another one of the same law contains, or that are told already."""
     names = [(shape["term"], {p["name"] for p in shape["parameters"]}) for shape in shapes]
     return [
         shape
-        for shape, (term, own) in zip(shapes, names, strict=True)
+        for i, (shape, (term, own)) in enumerate(zip(shapes, names, strict=True))
         if not any(term == other and own < more for other, more in names)
+        and (term, own) not in names[:i]
     ]
 
 

@@ -52,6 +52,7 @@ def test_fixed_bounds_are_numbers_and_rivals_all_listed(capsys):
 def test_what_differs_in_the_number_of_harmonics_is_told_once(capsys):
     text = printed(capsys, "cogging")
     assert text.count("Cogging: ") == 1 and "cogging_harmonic3_cos" in text
+    assert printed(capsys, "frictional_lag").count("FrictionalLag: ") == 1
 
 
 def test_first_order_is_said(capsys):

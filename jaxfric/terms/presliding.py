@@ -154,7 +154,7 @@ def _memory_bounds(scales):
 
 
 class FrictionalLag(AbstractMemory):
-    """A Stribeck bump that follows speed late: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
+    """A Stribeck bump late by a dead time or lags: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
 
     `bump` is g, in the steady state; constant and viscous friction have no memory (Armstrong-
     Hélouvry, Dupont & Canudas de Wit 1994, section 2.4). `frictional_lag` τ, s, is the whole delay
