@@ -261,6 +261,15 @@ def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
     assert "0.0369" not in text and "cannot tell" in text
 
 
+@pytest.mark.parametrize("end", ["", "lower_"])
+def test_an_end_stop_is_told_with_its_place_and_stiffness(end):
+    place = Estimate(np.float64(0.2312), np.float64(0.0021), "m")
+    stiffness = Estimate(np.float64(85.0), np.float64(4.0), "N/m")
+    values = {f"{end}stop_position": place, f"{end}stop_stiffness": stiffness}
+    text = sentence("end_stop", values, 0.3, ())
+    assert "From 0.2312 m ± 0.0042 m" in text and "85.0 N/m ± 8.0 N/m" in text
+
+
 def finalist(term):
     """A candidate of that term, at the nonlinear parameters that it has, beside the base."""
     trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))

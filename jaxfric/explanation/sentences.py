@@ -36,7 +36,8 @@ _TEXTS = {
     "spring": "A force proportional to position, {stiffness}: a spring",
     "hardening_spring": "A force that grows with the cube of position, {cubic_stiffness} about "
     "{spring_centre}: a hardening spring",
-    "end_stop": "A force that starts near an end of the stroke: an elastic end stop",
+    "end_stop": "From {stop_position} to the end of the stroke a force grows by {stop_stiffness}: "
+    "an elastic end stop",
     "position_dependent_friction": "Friction varies along the stroke by {amplitude}, with a period "
     "of {friction_period}",
     "sticky_spot": "Extra friction of {spot_force} around {spot_position}, half-width "
@@ -70,7 +71,8 @@ _TEXTS = {
 
 def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals) -> str:
     """One finding as a sentence, with its share and what it could be instead."""
-    words = {name: quantity(estimate) for name, estimate in parameters.items()}
+    # The stop at the lower end is told as the one at the upper end.
+    words = {n.removeprefix("lower_"): quantity(estimate) for n, estimate in parameters.items()}
     text = _TEXTS.get(effect, effect.replace("_", " ")).format_map(_Gaps(words))
     text += f"; {share:.0%} of the unexplained force"
     if rivals:
