@@ -286,9 +286,15 @@ def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
 
 
 def test_what_lags_is_a_curve_that_is_there(healthy):
-    lag, _ = finalist(terms.FrictionalLag(0.02, terms.Gaussian(0.05)))
-    for name, there in (("gaussian", True), ("coulomb-viscous", False)):
-        asked = question.ask(healthy[0], None, models.named(name))
+    lag, beta = finalist(terms.FrictionalLag(0.02, terms.Gaussian(0.05)))
+    for name, force, there in (
+        ("gaussian", 6.0, True),
+        ("coulomb-viscous", 6.0, False),
+        ("gaussian", 60.0, False),  # more than all the friction there is
+    ):
+        run = planted(healthy[0], lag.trial.candidate.term, (force,))
+        asked = question.ask(run, None, models.named(name))
+        lag.betas = (*asked.base.betas, beta)
         assert plausible.plausible(lag, asked.base, asked.evidence) is there
 
 
