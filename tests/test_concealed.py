@@ -10,6 +10,7 @@ from jaxfric import concealed, models
 from jaxfric.catalogue import CATALOGUE
 from jaxfric.concealed.kinds import KINDS
 from jaxfric.concealed.nominal import friction, rms
+from jaxfric.concealed.tuning import in_loop
 
 SIZE = 0.12
 # Where a lag makes the force differ most, at a reversal, its size does not count (slip alone does).
@@ -105,7 +106,7 @@ def check(name, seed, machine, run):
     assert rms(slip_residual(machine, run)) < 1.4 * expected_noise(machine)
     size = machine.truth[name]["size"]
     force = hidden - np.mean(hidden) if KINDS[name].centred else hidden
-    acting = rms(force) / machine.coulomb
+    acting = in_loop(machine, name, force, run.true[0].velocity)
     most = 4.0 if name in IN_SLIP else 1.6
     assert size / 1.6 < acting < most * size, (name, seed, size, acting)
 

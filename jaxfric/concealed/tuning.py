@@ -42,7 +42,7 @@ def _improved(machine, name, truth, n, size):
     first = truth[kind.tuned]
     tried = np.clip([first / _STEP, first * _STEP], low, high)
     truths = [kind.complete({**truth, kind.tuned: float(value)}, n) for value in tried]
-    sizes = _sizes(machine, name, truths, n)
+    sizes = _sizes(machine, name, truths)
     span = np.diff(np.log(tried))[0]
     # A size that does not grow with the parameter says nothing about where to look for more.
     slope = max(np.diff(np.log(sizes))[0] / span, 0.1)
@@ -54,7 +54,7 @@ def _improved(machine, name, truth, n, size):
     return better, between or wanted < low or wanted > high
 
 
-def _sizes(machine, name, truths, n):
+def _sizes(machine, name, truths):
     """Of the effect's force in the closed loop, in parts of the Coulomb level."""
     kind = KINDS[name]
     twins = [
@@ -67,14 +67,17 @@ def _sizes(machine, name, truths, n):
         for truth in truths
     ]
     found = simulate([(twin, 0) for twin in twins])
-    forces = [each.hidden[name] for each in found]
-    if kind.impacts:
-        window = max(round(n.plan.sample_rate / n.bandwidth), 1)
-        mean, still = np.full(window, 1 / window), machine.physics["still"]
-        forces = [
-            np.convolve(force, mean, "same") * (np.abs(each.true.velocity) > still)
-            for force, each in zip(forces, found, strict=True)
-        ]
-    sizes = np.array([rms(force) / machine.coulomb for force in forces])
+    sizes = np.array([in_loop(machine, name, f.hidden[name], f.true.velocity) for f in found])
     # A loop that bursts is too large an effect.
     return np.clip(np.nan_to_num(sizes, nan=np.inf), 1e-6, 1e3)
+
+
+def in_loop(machine: Machine, name: str, force: np.ndarray, velocity: np.ndarray) -> float:
+    """Size of an effect's force along a run in closed loop, in parts of the Coulomb level."""
+    if KINDS[name].impacts:
+        physics = machine.physics
+        window = machine.plan.sample_rate / np.sqrt(physics["kp"] / physics["mass"])
+        count = max(round(window), 1)
+        force = np.convolve(force, np.full(count, 1 / count), "same")
+        force = force * (np.abs(velocity) > physics["still"])
+    return rms(force) / machine.coulomb
