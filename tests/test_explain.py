@@ -318,6 +318,15 @@ def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
         assert (telling._lasting([spot], asked.base, asked) == [spot]) is there
 
 
+def test_what_the_held_out_recording_did_not_record_is_not_asked(healthy):
+    """A load cell on one of two runs: no error, and the place stays."""
+    run = dataclasses.replace(healthy[0], channels={"load": jnp.sin(3.0 * healthy[0].time)})
+    asked = question.ask(run, healthy[1], models.named("gaussian"))
+    seen = predictions.with_predictions(asked.evidence, asked.base)
+    places = {place.coordinate: place for place in locate.locate(seen, asked.base)}
+    assert telling._lasting([places["load"]], asked.base, asked) == [places["load"]]
+
+
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     asked = question.ask(healthy[0], None, models.named("gaussian"))
     floor = regression.fast(asked.base)

@@ -168,7 +168,10 @@ def _draw_gap(rng, n, size):
 
 
 def _flanks(truth, n):
-    """Flanks that give way by half the half-gap at most: beyond, it is a compliance that shows."""
+    """Flanks that give way by half the half-gap, as far as a substep resolves what stiff ones do.
+
+    Where they give way by more than the gap, a compliance is what shows.
+    """
     reduced = _reduced(truth, n.mass)
     stiff = np.sqrt(2 * truth["backlash_force"] / (truth["half_gap"] * reduced))
     rate = min(max(truth["contact_rate"], stiff), 0.25 / n.substep)

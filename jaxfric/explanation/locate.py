@@ -85,24 +85,27 @@ def _place(name, raw, scan: Scan, p_value, peak, knots, now: Fit) -> Place:
     return Place(name, share, size, p_value, peak, curve)
 
 
-def repeats(place: Place, now: Fit, held: Evidence) -> bool:
-    """Whether a place's curve takes something off what a fit leaves of another recording.
+def repeated(places: list[Place], now: Fit, held: Evidence) -> list[Place]:
+    """The places whose curve takes something off what a fit leaves of another recording.
 
-    The fit's parameters may move there; `held` with the fit's predictions. What belongs to the
-    moment, and lines, whose phase may be another, are not asked.
+    The fit's parameters may move there; `held` with the fit's predictions. Not asked, and so kept,
+    are the coordinates of time, lines, whose phase may be another, and what the other recording
+    did not record.
     """
-    if place.coordinate.startswith("time_") or place.coordinate == "time":
-        return True
-    if not len(place.curve[0]):
-        return True
-    value, factor, kind = coordinates(held)[place.coordinate]
-    knots, heights = place.curve
-    curve = _hats(held, value, factor, kind, knots) @ heights
-    there = fit(now.terms, held, now.betas, 0)
+    there, known = fit(now.terms, held, now.betas, 0), coordinates(held)
     basis = there.basis()
-    curve = curve - basis @ (basis.T @ curve)
     left = there.residual - basis @ (basis.T @ there.residual)
-    return bool(np.sum((left - curve) ** 2) < np.sum(left**2))
+
+    def again(place: Place) -> bool:
+        # Lines are no coordinate of a curve.
+        if place.coordinate.startswith("time") or place.coordinate not in known:
+            return True
+        knots, heights = place.curve
+        curve = _hats(held, *known[place.coordinate], knots) @ heights
+        curve = curve - basis @ (basis.T @ curve)
+        return bool(np.sum((left - curve) ** 2) < np.sum(left**2))
+
+    return [place for place in places if again(place)]
 
 
 def coordinates(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:

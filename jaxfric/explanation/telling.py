@@ -15,7 +15,7 @@ from .chance import LEVEL
 from .curves import curves
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
-from .locate import Place, locate, repeats
+from .locate import Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
@@ -120,8 +120,7 @@ def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
     places = [p for p in places if p.coordinate != "time" or p.size > fast(now)]
     if asked.held is None:
         return places
-    held = with_predictions(asked.held, now)
-    return [place for place in places if repeats(place, now, held)]
+    return repeated(places, now, with_predictions(asked.held, now))
 
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
@@ -221,7 +220,9 @@ def _with_smoothing(found: Named, asked: Question, rest, units) -> list[dict[str
 
 
 def _dated(parameters: dict[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
-    """A step lies somewhere between two rows, a kernel wide each; at rest they are far apart."""
+    """A step lies somewhere between two rows, each blurred by the kernel; at rest they are far
+    apart. The error of a time that may be anywhere in that width, s.
+    """
     own = parameters["step_time"]
     times = np.asarray(evidence.motion.time)[evidence.centre]
     after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
