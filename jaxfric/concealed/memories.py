@@ -220,14 +220,19 @@ def _draw_compliance(rng, n, size):
     # Sampling and the velocity filter turn the loop's damping into its opposite at ten times the
     # bandwidth; a joint with less damping of its own than a tenth would ring for ever there.
     truth = {"load_share": rng.uniform(0.3, 0.5), "load_friction_share": rng.uniform(0.0, 0.5)}
-    truth["damping_ratio"] = rng.uniform(0.1, 0.2)
+    truth["joint_damping_ratio"] = rng.uniform(0.1, 0.2)
     return solved(COMPLIANCE, truth, n, size)
 
 
 def _stiffness(truth, n):
     load = truth["load_share"] * n.mass
     stiffness = load / truth["time_constant"] ** 2
-    return truth | {"stiffness": stiffness, "compliance": load**2 / stiffness}
+    # Against a held motor the load's own viscous friction damps it too.
+    viscous = 0.5 * (n.physics["viscous+"] + n.physics["viscous-"]) * truth["load_friction_share"]
+    damping = truth["joint_damping_ratio"] + 0.5 * viscous * truth["time_constant"] / load
+    return truth | {
+        "stiffness": stiffness, "compliance": load**2 / stiffness, "damping_ratio": damping,
+    }  # fmt: skip
 
 
 def _swinging(truth, n):
@@ -236,7 +241,7 @@ def _swinging(truth, n):
     spectrum = np.fft.rfft(n.a * np.hanning(n.a.size)) * np.sqrt(8 / 3)
     omega = TURN * np.fft.rfftfreq(n.a.size, 1 / n.plan.sample_rate)
     ratio = omega * truth["time_constant"]
-    damped = 1 + 2j * truth["damping_ratio"] * ratio
+    damped = 1 + 2j * truth["joint_damping_ratio"] * ratio
     response = damped / (damped - ratio**2) - 1
     followed = 1 / (1 + (omega / n.bandwidth) ** 2)
     pull = np.fft.irfft(spectrum * response * followed, n.a.size)
@@ -246,7 +251,8 @@ def _swinging(truth, n):
 def _compliant(truth, base):
     # Both bodies swing faster than the load against a held motor, whose damping ratio is drawn.
     faster = 1 / np.sqrt(1 - truth["load_share"])
-    return _coupled(truth, base, faster / truth["time_constant"], truth["damping_ratio"] * faster)
+    damping = truth["joint_damping_ratio"] * faster
+    return _coupled(truth, base, faster / truth["time_constant"], damping)
 
 
 COMPLIANCE: Kind = Kind(

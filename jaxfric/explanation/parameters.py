@@ -1,5 +1,7 @@
 """Parameters of fitted terms with their standard errors, as people name them."""
 
+from collections.abc import Callable
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -70,21 +72,45 @@ def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
 
 
 def with_smoothing(ours: dict[str, Estimate], wide: dict[str, Estimate]) -> dict[str, Estimate]:
-    """Estimates whose errors contain what the kernel's smoothing does to them.
+    """Estimates whose errors contain what another width of the kernel changes.
 
-    It grows with the square of the width: a kernel of twice the width, `wide`, is off by four times
-    as much, and a third of the difference, as far as it is no noise, is ours (Richardson 1911).
+    Smoothing grows with the width; what the encoder's noise does to a column, and the rows beside
+    a reversal, go the other way. What a kernel of twice the width, `wide`, changes beyond its own
+    noise is an error of the method, to be counted as it is (Barlow 2002).
+    """
+    return _widened(ours, wide, lambda own, there, apart: apart**2 - there**2)
+
+
+def with_elsewhere(ours: dict[str, Estimate], there: dict[str, Estimate]) -> dict[str, Estimate]:
+    """Estimates whose errors contain what another recording of the same machine says.
+
+    No law is quite the machine's, and what it lacks moves the parameters from motion to motion by
+    more than the noise does. Two values further apart than their errors allow have an error in
+    common to both, here its moment estimate (DerSimonian & Laird 1986). What a recording does not
+    show, it says nothing about: parameters with no finite error there stay.
+    """
+    return _widened(ours, there, lambda own, there, apart: (apart**2 - own**2 - there**2) / 2)
+
+
+def _widened(
+    ours: dict[str, Estimate],
+    theirs: dict[str, Estimate],
+    variance: Callable[[float, float, float], float],
+) -> dict[str, Estimate]:
+    """Estimates with errors beyond their own.
+
+    `variance` says from both standard errors and the distance of the two values by how much.
     """
 
     def both(name: str, own: Estimate) -> Estimate:
-        there = wide[name]
-        off = float(there.value - own.value)
+        there = theirs[name]
+        apart = float(there.value - own.value)
         if name.startswith("phase") or name.endswith("_phase"):
-            off = float(np.angle(np.exp(1j * off)))
-        beyond = off**2 - float(there.standard_error) ** 2
-        if not beyond > 0:
+            apart = float(np.angle(np.exp(1j * apart)))
+        more = variance(float(own.standard_error), float(there.standard_error), apart)
+        if not (np.isfinite(more) and more > 0):
             return own
-        error = np.hypot(own.standard_error, np.sqrt(beyond) / 3)
+        error = np.hypot(own.standard_error, np.sqrt(more))
         return own._replace(standard_error=np.float64(error))
 
     return {name: both(name, estimate) for name, estimate in ours.items()}

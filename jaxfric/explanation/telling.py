@@ -159,7 +159,7 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
 def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Finding]:
     seen = with_predictions(asked.evidence, found.last)
     start = len(found.last.terms) - len(found.taken)
-    values = _with_smoothing(found, asked, rest, units)[start:]
+    values = _estimates(found, asked, rest, units)[start:]
     findings = []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
@@ -193,30 +193,42 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
     return sorted(findings, key=lambda finding: -finding.share)
 
 
-def _with_smoothing(found: Named, asked: Question, rest, units) -> list[dict[str, Estimate]]:
-    """The parameters of each term; their errors contain what a kernel of twice the width changes.
+def _estimates(found: Named, asked: Question, rest, units) -> list[dict[str, Estimate]]:
+    """The parameters of each term; their errors contain what another view of the machine changes.
 
-    Where the force acts late, that is seen on the recording with the force put back, `rest`, by
-    all terms but the last, which is the delay or lag itself.
+    Views are a kernel of twice the width and the held-out recording. Where the force acts late,
+    that is seen with the force put back, `rest`, by all terms but the last, which is the delay or
+    lag itself.
     """
-    now = found.last
-    ours = spelled.estimates(now, asked.block, units)
-    where, left = rest if isinstance(now.terms[-1], LATE) else (asked, found)
-    if where.wide is None:
-        return ours
-    known = left.last
-    again = fit(known.terms, with_predictions(where.wide, known), known.betas, 4)
-    block = np.linspace(0, where.block[-1] + 1, len(where.wide.rows), endpoint=False).astype(int)
-    wide = spelled.estimates(again, block, units)
-    both = [spelled.with_smoothing(*pair) for pair in zip(ours, wide, strict=False)]
+    ours = spelled.estimates(found.last, asked.block, units)
+    where, left = rest if isinstance(found.last.terms[-1], LATE) else (asked, found)
     late = [
         {
             name: own._replace(standard_error=np.hypot(own.standard_error, found.smoothed))
             for name, own in term.items()
         }
-        for term in ours[len(both) :]
+        for term in ours[len(left.last.terms) :]
     ]
+    both, count = ours[: len(left.last.terms)], int(where.block[-1]) + 1
+    if where.wide is not None:
+        wide = _seen_by(where.wide, left.last, count, units)
+        both = [spelled.with_smoothing(*pair) for pair in zip(both, wide, strict=True)]
+    if where.held is not None:
+        # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
+        lasting = verification.lasting(left.last, left.rephased)
+        there = _seen_by(where.held, lasting, count, units)
+        own = {id(term): values for term, values in zip(lasting.terms, there, strict=True)}
+        both = [
+            spelled.with_elsewhere(ours, own.get(id(term), ours))
+            for term, ours in zip(left.last.terms, both, strict=True)
+        ]
     return both + late
+
+
+def _seen_by(view: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
+    """The parameters of a model refitted to another view of the machine, in `count` blocks."""
+    again = fit(known.terms, with_predictions(view, known), known.betas, 4)
+    return spelled.estimates(again, np.arange(len(view.rows)) * count // len(view.rows), units)
 
 
 def _dated(parameters: dict[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:

@@ -55,6 +55,18 @@ def wavelike(now: Fit, number: int) -> bool:
     return paired and "position" in term.coordinates
 
 
+def lasting(now: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
+    """A fit without the terms that say nothing of another recording; only its terms and β count."""
+    keep = [
+        i for i, t in enumerate(now.terms) if i not in rephased and not isinstance(t, _MOMENTARY)
+    ]
+    return now._replace(
+        terms=tuple(now.terms[i] for i in keep),
+        betas=tuple(now.betas[i] for i in keep),
+        alphas=tuple(now.alphas[i] for i in keep),
+    )
+
+
 def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
     """norm(force − predicted)/norm(force) over the rows, nothing refitted.
 
