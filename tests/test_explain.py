@@ -17,6 +17,7 @@ from jaxfric.explanation import (
     explain,
     locate,
     naming,
+    parameters,
     plausible,
     predictions,
     pulses,
@@ -373,3 +374,37 @@ def test_terms_that_share_what_they_remove_stand_in_for_another():
     assert not telling._stand_ins(found(0.4, 0.2, 0.05), 0.7)
     # Two effects may overlap: a strong excitation of one is seldom orthogonal to the other.
     assert not telling._stand_ins(found(0.3, 0.1), 0.9)
+
+
+def both_ways(values, errors, names=("force",) * 2, joined=parameters.with_elsewhere):
+    """The standard error of the first of two estimates once the second is known."""
+    one, other = (
+        {name: Estimate(np.float64(value), np.float64(error), "N")}
+        for name, value, error in zip(names, values, errors, strict=True)
+    )
+    return float(joined(one, other)[names[0]].standard_error)
+
+
+def test_an_error_contains_what_another_recording_says_differently():
+    assert both_ways([5.0, 5.001], [0.1, 0.1]) == 0.1
+    assert both_ways([5.0, 6.0], [0.1, np.inf]) == 0.1
+    # Half of the squared distance is each one's.
+    assert both_ways([5.0, 6.0], [0.1, 0.1]) == pytest.approx(np.sqrt(0.5))
+    # A phase of a whole turn more is the same.
+    assert both_ways([0.1, 0.1 + 2 * np.pi], [0.1, 0.1], ("phase",) * 2) == 0.1
+    # Machines whose law moves their parameter by three times what the noise does.
+    truth, noise, dark = 7.0, 0.1, 0.3
+    spread = np.random.default_rng(5).normal(size=(2000, 2)) * np.hypot(noise, dark)
+    held = [
+        abs(a) < 1.96 * both_ways([truth + a, truth + b], [noise] * 2) for a, b in spread.tolist()
+    ]
+    assert np.mean(np.abs(spread[:, 0]) < 1.96 * noise) < 0.5
+    assert np.mean(held) > 0.75
+
+
+def test_an_error_contains_what_another_width_changes():
+    def widened(*args):
+        return both_ways(*args, joined=parameters.with_smoothing)
+
+    assert widened([5.0, 5.2], [0.1, 0.3]) == 0.1
+    assert widened([5.0, 6.0], [0.1, 0.3]) == pytest.approx(np.sqrt(0.1**2 + 1.0 - 0.3**2))

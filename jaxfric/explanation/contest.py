@@ -6,7 +6,7 @@ import numpy as np
 
 from ..terms import DisturbancePulses
 from .candidates import Candidate, Field, scaled
-from .chance import DRAWS, LEVEL, Judge, adjusted, blocks, thresholds
+from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .pulses import pulses
 from .regression import Fit, fit
@@ -74,33 +74,37 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     judge = Judge(now, block, seed)
-    scans = [
-        judge(field.columns(i, seen), candidate.effect.positive)
-        for i, candidate in enumerate(field.candidates)
-    ]
+
+    def scanned(number: int) -> tuple[Scan, np.ndarray]:
+        raw = field.columns(number, seen)
+        scan = judge(raw, field.candidates[number].effect.positive)
+        return scan, raw[scan.best : scan.best + 1]
+
+    scans, best = zip(*map(scanned, range(len(field.candidates))), strict=True)
     drawn = np.array([s.drawn for s in scans])
     p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
     least = thresholds(drawn, LEVEL)
     trials = [
-        _trial(judge, c, field.columns(i, seen), scan, float(p), float(limit))
-        for i, (c, scan, p, limit) in enumerate(
-            zip(field.candidates, scans, p_values, least, strict=True)
+        _trial(judge, candidate, own, scan, float(p), float(limit))
+        for candidate, own, scan, p, limit in zip(
+            field.candidates, best, scans, p_values, least, strict=True
         )
     ]
     known = any(isinstance(term, DisturbancePulses) for term in now.terms)
     for candidate in [] if known else pulses(seen, now):
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events: what stands out has been tested.
-        trials.append(_trial(judge, candidate, raw, judge(raw), 1 / (1 + DRAWS), np.inf))
+        scan = judge(raw)
+        own = raw[scan.best : scan.best + 1]
+        trials.append(_trial(judge, candidate, own, scan, 1 / (1 + DRAWS), np.inf))
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.chance for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
     return Contest(trials, _finals(seen, now, trials, size), size)
 
 
-def _trial(judge, candidate, raw, scan, p_value, limit) -> Trial:
+def _trial(judge, candidate, own, scan, p_value, limit) -> Trial:
     best = scan.best
-    own = raw[best : best + 1]
     inside = np.einsum("gkj,glj->gkl", own, judge.fresh(own)[0])
     fresh = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
     return Trial(

@@ -23,8 +23,9 @@ from ..terms.base import AbstractTerm, Scales
 NODES = 6
 # Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
 STRIDE = 3
-# Values of the nonlinear parameters that one compiled call takes.
-BATCH = 8
+# Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
+# neighbour that gives its derivative.
+BATCH, PAIR = 8, 2
 
 
 class Evidence(NamedTuple):
@@ -68,7 +69,8 @@ class Evidence(NamedTuple):
         parts = []
         for start in range(0, len(betas), BATCH):
             some = betas[start : start + BATCH]
-            full = np.concatenate([some, np.repeat(some[-1:], BATCH - len(some), axis=0)])
+            size = PAIR if len(some) <= PAIR else BATCH
+            full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
             plain, momentum = evaluate(term, jnp.asarray(full), self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
@@ -91,10 +93,11 @@ def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndar
 
 
 def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
-    """Columns, `(BATCH, p, M)`, and momentum, `None` where there is none, at `BATCH` β.
+    """Columns, `(B, p, M)`, and momentum, `None` where there is none, at β, `(B, d)`.
 
-    Compiled once for each kind of term; but a term with numbers of the recording built into its
-    structure (the middle of the stroke, say) would be compiled for every recording anew.
+    Compiled once for each kind of term and each of the two B; but a term with numbers of the
+    recording built into its structure (the middle of the stroke, say) would be compiled for every
+    recording anew.
     """
     return (_columns if _has_numbers(term) else _compiled)(term, betas, motion)
 
@@ -107,7 +110,7 @@ def _columns(term, betas, motion):
     if term.nonlinear:
         return jax.vmap(one)(betas)
     alone = one(betas[0])
-    return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (BATCH, *x.shape)), alone)
+    return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (len(betas), *x.shape)), alone)
 
 
 _compiled = eqx.filter_jit(_columns)
@@ -185,7 +188,7 @@ def lengthened(recording: Recording) -> Recording:
     """The recording with its velocity, of one of few lengths, so that few programs are compiled."""
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", num_segments=1)
-    return signals.prepare(pad(nameless, _octave(recording.num_samples)))
+    return signals.prepare(pad(nameless, _rounded(recording.num_samples)))
 
 
 _scales = eqx.filter_jit(signals.scales)
@@ -199,9 +202,10 @@ def _widest(recording: Recording) -> int:
     return max(16, int(np.count_nonzero(np.asarray(recording.mask))) // KERNELS)
 
 
-def _octave(count: int) -> int:
-    """The next power of two, so that recordings of any length share a few compiled programs."""
-    return max(256, 1 << (count - 1).bit_length())
+def _rounded(count: int) -> int:
+    """The next power of two, or three quarters of it, so that few programs are compiled."""
+    octave = max(256, 1 << (count - 1).bit_length())
+    return octave if count > octave * 3 // 4 else octave * 3 // 4
 
 
 def _node_signals(recording: Recording, limits: Scales, step: int, delay: float) -> dict:
@@ -291,9 +295,9 @@ def _averaged(weights: np.ndarray) -> np.ndarray:
 
 
 def _padded(parts: dict, recording: Recording) -> Recording:
-    """The nodes as a recording, lengthened as [`_octave`][] says."""
+    """The nodes as a recording, lengthened as [`_rounded`][] says."""
     count = len(parts["time"])
-    length = _octave(count)
+    length = _rounded(count)
 
     def pad(values):
         return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))

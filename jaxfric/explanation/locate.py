@@ -43,46 +43,47 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
     """Every coordinate, the largest share first; `evidence` with the fit's predictions."""
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     judge = Judge(now, block, seed)
-    names, raws, scans, peaks, knots = [], [], [], [], []
-    for name, (value, factor, kind) in coordinates(evidence).items():
-        places = _knots(name, value[evidence.centre])
-        raw = _hats(evidence, value, factor, kind, places)
-        names.append(name)
-        raws.append(raw)
-        knots.append(places)
-        scans.append(judge(scaled(raw[None])))
-        peaks.append(np.nan)
-    for name in ("position", "time"):
-        if name == "position" and evidence.motion.position is None:
-            continue
-        if name == "time" and not evidence.clock:
-            continue
+
+    def over(coordinate) -> _Scanned:
+        name, (value, factor, kind) = coordinate
+        knots = _knots(name, value[evidence.centre])
+        raw = _hats(evidence, value, factor, kind, knots)
+        return _Scanned(name, judge(scaled(raw[None])), raw, knots)
+
+    def along(name: str) -> _Scanned:
         grid = line_frequencies(evidence, name)
         scan = judge(scaled(Lines(name, False).columns(evidence, grid)))
-        names.append(f"{name}_lines")
-        raws.append(None)
-        knots.append(np.zeros(0))
-        scans.append(scan)
-        peaks.append(float(grid[scan.best]))
-    p_values = adjusted(np.array([s.gain.max() for s in scans]), np.array([s.drawn for s in scans]))
-    found = [
-        _place(name, raw, scan, float(p), peak, at, now)
-        for name, raw, scan, p, peak, at in zip(
-            names, raws, scans, p_values, peaks, knots, strict=True
-        )
-    ]
+        return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
+
+    there = {"position": evidence.motion.position is not None, "time": evidence.clock}
+    lines = [along(name) for name, known in there.items() if known]
+    seen = [*map(over, coordinates(evidence).items()), *lines]
+    gains = np.array([s.scan.gain.max() for s in seen])
+    p_values = adjusted(gains, np.array([s.scan.drawn for s in seen]))
+    found = [_place(s, float(p), now) for s, p in zip(seen, p_values, strict=True)]
     return sorted(found, key=lambda place: -place.share)
 
 
-def _place(name, raw, scan: Scan, p_value, peak, knots, now: Fit) -> Place:
+class _Scanned(NamedTuple):
+    """A coordinate judged: its name and how it did; the curve's hats `(J, K)`, or a line's peak."""
+
+    name: str
+    scan: Scan
+    raw: np.ndarray | None = None
+    knots: np.ndarray = np.zeros(0)
+    peak: float = float("nan")
+
+
+def _place(seen: _Scanned, p_value: float, now: Fit) -> Place:
+    scan, knots = seen.scan, seen.knots
     share = max(float(scan.gain[scan.best] - scan.drawn.mean()), 0.0)
     size = float(np.sqrt(share * now.energy / len(now.residual)))
     curve = (knots, np.zeros_like(knots))
-    if raw is not None and len(knots):
+    if seen.raw is not None and len(knots):
         basis = now.basis()
-        own = raw - basis @ (basis.T @ raw)
+        own = seen.raw - basis @ (basis.T @ seen.raw)
         curve = (knots, np.linalg.lstsq(own, now.residual, rcond=1e-3)[0])
-    return Place(name, share, size, p_value, peak, curve)
+    return Place(seen.name, share, size, p_value, seen.peak, curve)
 
 
 def repeated(places: list[Place], now: Fit, held: Evidence) -> list[Place]:

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..terms import ActuatorDeadband
-from .evidence import BATCH, NODES, Evidence, evaluate
+from .evidence import NODES, PAIR, Evidence, evaluate
 from .regression import Fit
 
 
@@ -19,7 +19,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
         if any(name.startswith("predicted_") for name in term.coordinates):
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
-            term, jnp.asarray(np.repeat(beta[None], BATCH, axis=0)), evidence.motion
+            term, jnp.asarray(np.repeat(beta[None], PAIR, axis=0)), evidence.motion
         )
         force = force + alpha @ np.asarray(plain[0])
         if moving is not None:
