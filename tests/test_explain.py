@@ -328,6 +328,16 @@ def test_what_the_held_out_recording_did_not_record_is_not_asked(healthy):
     assert telling._lasting([places["load"]], asked.base, asked) == [places["load"]]
 
 
+def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
+    speed = jnp.cos(3.0 * healthy[0].time)
+    run = dataclasses.replace(healthy[0], channels={"neighbour_velocity": speed})
+    run = planted(run, terms.CrossAxis(), (0.2, 4.0))
+    lacking = dataclasses.replace(healthy[1], source="other.csv")
+    message = "other.csv lacks 'neighbour_velocity', by which .* cross axis.*Add the signal"
+    with pytest.raises(ValueError, match=message):
+        explain(run, "gaussian", lacking)
+
+
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     asked = question.ask(healthy[0], None, models.named("gaussian"))
     floor = regression.fast(asked.base)

@@ -112,14 +112,32 @@ def _proved(recording, holdout, structure, seed) -> tuple[Question, Named]:
     Where one did not, another may account for the same here and hold there: it is looked for, once.
     """
     asked, first = pursue(recording, holdout, structure, seed)
+    _check_signals(first, recording, holdout)
     found = _verified(first, asked, structure, seed)
     refuted = _names(first) - _names(found)
     if not refuted:
         return asked, found
     again = search(asked.evidence, asked.base, structure, asked.wide, seed, refuted)
+    _check_signals(again, recording, holdout)
     again = _verified(again, asked, structure, seed)
     errors = [verification.error(each.last, asked.held, each.rephased) for each in (found, again)]
     return asked, again if _names(again) > _names(found) and errors[1] < errors[0] else found
+
+
+def _check_signals(found: Named, recording, holdout) -> None:
+    """Raise `ValueError` if a finding reads a signal that the held-out recording lacks."""
+    if holdout is None:
+        return
+    for taken in found.taken:
+        candidate = taken.trial.candidate
+        lacking = (candidate.term.coordinates & set(recording.channels)) - set(holdout.channels)
+        for signal in sorted(lacking):
+            effect = candidate.effect.name.replace("_", " ")
+            raise ValueError(
+                f"{holdout.source or 'The held-out recording'} lacks {signal!r}, by which "
+                f"{recording.source or 'the recording'} shows {effect}, so that this cannot be "
+                "judged there. Add the signal, or explain without a held-out recording."
+            )
 
 
 def _names(found: Named) -> frozenset[str]:
