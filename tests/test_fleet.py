@@ -238,6 +238,23 @@ def test_a_second_run_for_the_same_output_is_refused(tmp_path):
     with journal.Journal(tmp_path / "fits.csv", {}):
         with pytest.raises(ValueError, match="another run"):
             journal.Journal(tmp_path / "fits.csv", {}).__enter__()
+        with pytest.raises(ValueError, match="another run"):
+            journal.forget(tmp_path / "fits.csv")
+
+
+def test_beginning_anew_each_process_removes_its_own_rows(tmp_path):
+    out = tmp_path / "fits.csv"
+    for part in range(3):
+        with journal.Journal(out, {}, part):
+            pass
+
+    def left():
+        return [path.stem for path in sorted(journal.folder(out).glob("*"))]
+
+    journal.forget(out, 1, 2)
+    assert left() == ["rows-0", "rows-2"]
+    journal.forget(out, 0, 2)
+    assert left() == []
 
 
 def test_rows_of_changed_files_are_made_anew(tmp_path):

@@ -32,7 +32,7 @@ def run(arguments: Namespace) -> int:
 
         pictures.library()
     if arguments.restart:
-        journal.forget(arguments.out)
+        journal.forget(arguments.out, jax.process_index(), jax.process_count())
     progress = Progress(len(files))
     kept, rows = fleet.run(
         files, arguments.out, _options(arguments), jobs=_jobs(arguments), tell=progress

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from .files import File
 
@@ -25,9 +25,31 @@ def folder(out: str | os.PathLike) -> Path:
     return Path(f"{os.fspath(out)}.partial")
 
 
-def forget(out: str | os.PathLike) -> None:
-    """Remove the rows that an interrupted run has left for an output."""
-    shutil.rmtree(folder(out), ignore_errors=True)
+def forget(out: str | os.PathLike, part: int = 0, parts: int = 1) -> None:
+    """Remove the rows that an interrupted run has left for an output.
+
+    **Arguments:** `part`, the number of this process among `parts`: each removes its own, the first
+    also those of processes that there are no longer.
+
+    **Raises:** `ValueError` if another run is writing to them.
+    """
+    for path in sorted(folder(out).glob("rows-*.jsonl")):
+        number = int(path.stem.removeprefix("rows-"))
+        if number == part or (part == 0 and number >= parts):
+            with path.open("ab") as file:
+                _lock(file, path)
+            path.unlink()
+
+
+def _lock(file: BinaryIO, path: Path) -> None:
+    """Hold a journal until it is closed; raises `ValueError` if another run does."""
+    with suppress(ImportError):  # no such locks on Windows
+        import fcntl
+
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise ValueError(f"{path}: another run is writing to it.") from error
 
 
 class Journal:
@@ -41,7 +63,7 @@ class Journal:
     """
 
     def __init__(self, out: str | os.PathLike, task: Mapping[str, Any], part: int = 0):
-        self._out, self.folder = out, folder(out)
+        self.folder = folder(out)
         self._task = {"schema": SCHEMA, "jaxfric": _version(), "task": _plain(task)}
         self._path = self.folder / f"rows-{part}.jsonl"
 
@@ -55,7 +77,11 @@ class Journal:
                 f"{self.folder}: cannot be written: {error.strerror}. The rows are kept there "
                 "until the output is whole; is its folder there, and yours?"
             ) from error
-        self._lock()
+        try:
+            _lock(self._file, self._path)
+        except ValueError:
+            self._file.close()
+            raise
         self._mend()
         if not self._file.tell():
             self._append([self._task])
@@ -83,7 +109,7 @@ class Journal:
 
     def remove(self) -> None:
         """The output is whole: the folder goes."""
-        forget(self._out)
+        shutil.rmtree(self.folder, ignore_errors=True)
 
     def _check(self) -> None:
         for path in self.folder.glob("rows-*.jsonl"):
@@ -93,16 +119,6 @@ class Journal:
                     f"{self.folder}: holds rows made with {_difference(head, self._task)}. Give "
                     "those options to go on with them, or --restart to begin anew."
                 )
-
-    def _lock(self) -> None:
-        with suppress(ImportError):  # no such locks on Windows
-            import fcntl
-
-            try:
-                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                self._file.close()
-                raise ValueError(f"{self._path}: another run is writing to it.") from error
 
     def _mend(self) -> None:
         """Cut off a line without its end."""
