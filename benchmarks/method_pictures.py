@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxfric import concealed
 from jaxfric.cli.demo import EFFECT, SEED, SIZE
-from jaxfric.explanation import candidates, chance, evidence, question, regression, reversals
+from jaxfric.explanation import chance, evidence, question, regression, reversals
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.models import named
 
@@ -41,7 +41,7 @@ def rows(asked, machine):
 def draws(asked):
     """The best of all candidates by chance, and the gain of the winner."""
     seen = with_predictions(asked.evidence, asked.base)
-    field = candidates.Field(seen, asked.structure)
+    field = asked.field
     judge = chance.Judge(asked.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
     scans = [
         judge(field.columns(i, seen), candidate.effect.positive)

@@ -35,7 +35,6 @@ import peer_methods as methods
 from jaxfric import concealed, models
 from jaxfric.cli import _configure
 from jaxfric.explanation import verification
-from jaxfric.explanation.candidates import Field
 from jaxfric.explanation.contest import contest
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.question import ask
@@ -96,7 +95,7 @@ def judge(sealed, wanted):
         found |= select(asked, recording, [m for m in wanted if m in methods.SELECTING])
     if RANKING in wanted:
         seen = with_predictions(asked.evidence, asked.base)
-        trials = contest(seen, asked.base, Field(seen, structure)).trials
+        trials = contest(seen, asked.base, asked.field).trials
         best = max(trials, key=lambda trial: trial.gain).candidate.effect.name
         found[RANKING] = {"named": [[best]], "after": None}
     return found | predict(asked, [m for m in wanted if m in methods.PREDICTING])

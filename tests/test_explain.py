@@ -239,7 +239,7 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     run = planted(healthy[0], term, alpha, beta)
     asked = question.ask(run, None, models.named("gaussian"))
     monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (asked.base, []))
-    found = naming.search(asked.evidence, asked.base, asked.structure)
+    found = naming.search(asked.evidence, asked.base, asked.field)
     assert found.taken == []
 
 
@@ -338,6 +338,26 @@ def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
         explain(run, "gaussian", lacking)
 
 
+def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
+    gaussian = models.named("gaussian")
+    motion = question.from_position(healthy[0])
+    seen = evidence.gather(motion)
+    field = candidates.Field(seen, gaussian)
+    assert field.fits(evidence.gather(motion, seen.width, delay=3e-4))
+    assert not field.fits(evidence.gather(motion, 2 * seen.width))
+    assert not field.fits(evidence.gather(question.from_position(healthy[1]), seen.width))
+    first = question.ask(healthy[0], None, gaussian)
+    again = question.ask(healthy[0], None, gaussian, first.base, first)
+    assert again.field is first.field
+
+
+def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healthy, monkeypatch):
+    asked = question.ask(*healthy, models.named("gaussian"))
+    assert asked.wide is not None
+    monkeypatch.setattr("jaxfric.explanation.chance.FEWEST", 10_000)
+    assert question._wider(question.from_position(healthy[0]), asked.evidence) is None
+
+
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     asked = question.ask(healthy[0], None, models.named("gaussian"))
     floor = regression.fast(asked.base)
@@ -350,7 +370,7 @@ def test_what_was_refuted_is_not_named_again(healthy):
     term, alpha, beta = CASES["cogging"]
     asked = question.ask(planted(healthy[0], term, alpha, beta), None, models.named("gaussian"))
     plain, other = (
-        naming.search(asked.evidence, asked.base, asked.structure, refuted=frozenset(names))
+        naming.search(asked.evidence, asked.base, asked.field, refuted=frozenset(names))
         for names in ((), ("cogging",))
     )
     names = [

@@ -2,12 +2,13 @@
 
 import dataclasses
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from .. import terms as laws
 from ..catalogue import CATALOGUE, Effect
+from ..recording import Recording
 from ..terms.base import AbstractTerm, Directional, summands
 from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
@@ -92,7 +93,17 @@ class Field:
 
     def __init__(self, evidence: Evidence, base: AbstractTerm):
         self.candidates = candidates(evidence, base)
+        self._motion, self._rows, self._reach = evidence.motion, evidence.rows, evidence.reach
         self._kept: dict[int, np.ndarray] = {}
+
+    def fits(self, evidence: Evidence) -> bool:
+        """Whether the columns are those of other evidence: the same rows of the same motion, of
+        which the force plays no part.
+        """
+        ours, theirs = _signals(self._motion), _signals(evidence.motion)
+        known = ours.keys() == theirs.keys() and self._reach == evidence.reach
+        pairs = ((ours[name], theirs[name]) for name in ours if known)
+        return known and all(np.array_equal(*p) for p in [(self._rows, evidence.rows), *pairs])
 
     def columns(self, number: int, evidence: Evidence) -> np.ndarray:
         """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
@@ -102,6 +113,12 @@ class Field:
         if number not in self._kept:
             self._kept[number] = scaled(candidate.columns(evidence))
         return self._kept[number]
+
+
+def _signals(motion: Recording) -> dict[str, Any]:
+    """All that a term may read of a motion, by name."""
+    named = {name: getattr(motion, name) for name in ("time", "position", "velocity", "segment")}
+    return named | motion.channels
 
 
 def scaled(raw: np.ndarray) -> np.ndarray:

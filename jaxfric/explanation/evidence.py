@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import signals
 from ..recording import Recording, pad
+from ..terms import DryCompliance, ElasticBacklash
 from ..terms.base import AbstractTerm, Scales
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
@@ -24,8 +25,9 @@ NODES = 6
 # Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
 STRIDE = 3
 # Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
-# neighbour that gives its derivative.
-BATCH, PAIR = 8, 2
+# neighbour that gives its derivative; of a load that is stepped along the motion many at once, as
+# four times as many steps side by side take hardly longer.
+BATCH, PAIR, STEPPED = 8, 2, 32
 
 
 class Evidence(NamedTuple):
@@ -67,9 +69,10 @@ class Evidence(NamedTuple):
         if not len(term.affine):
             return np.zeros((len(betas), len(self.target), 0))
         parts = []
-        for start in range(0, len(betas), BATCH):
-            some = betas[start : start + BATCH]
-            size = PAIR if len(some) <= PAIR else BATCH
+        most = STEPPED if isinstance(term, DryCompliance | ElasticBacklash) else BATCH
+        for start in range(0, len(betas), most):
+            some = betas[start : start + most]
+            size = PAIR if len(some) <= PAIR else most
             full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
             plain, momentum = evaluate(term, jnp.asarray(full), self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]

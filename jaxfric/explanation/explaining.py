@@ -13,7 +13,7 @@ from ..recording import Recording
 from ..terms.base import AbstractTerm
 from . import verification
 from .baseline import Baseline, at_values, baseline_of, mismatch, simulated
-from .candidates import OF_THE_MOMENT, Field
+from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
@@ -76,7 +76,7 @@ def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: in
     if lateness is not None:
         # To first order a delay is a column; what it leaves of second order would be named too.
         later = None if holdout is None else lateness.undone(holdout)
-        there, behind = _proved(lateness.undone(recording), later, known.structure, seed)
+        there, behind = _proved(lateness.undone(recording), later, known.structure, seed, asked)
         found, behind = settled(found, behind, lateness, asked, there)
         rest = there, behind
     wrong = None
@@ -103,23 +103,24 @@ def _as_given(known: Baseline, asked: Question, seed) -> tuple[Question, Named]:
     """The search with the baseline's own values, which nothing on the recording contradicts."""
     base = at_values(known.model, asked.evidence)
     asked = asked._replace(base=base)
-    return asked, search(asked.evidence, base, known.structure, asked.wide, seed)
+    return asked, search(asked.evidence, base, asked.field, asked.wide, seed)
 
 
-def _proved(recording, holdout, structure, seed) -> tuple[Question, Named]:
+def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
     """The question and the findings that hold on the held-out recording.
 
     Where one did not, another may account for the same here and hold there: it is looked for, once.
+    `before`: a question about the same motion.
     """
-    asked, first = pursue(recording, holdout, structure, seed)
+    asked, first = pursue(recording, holdout, structure, seed, before)
     _check_signals(first, recording, holdout)
-    found = _verified(first, asked, structure, seed)
+    found = _verified(first, asked, seed)
     refuted = _names(first) - _names(found)
     if not refuted:
         return asked, found
-    again = search(asked.evidence, asked.base, structure, asked.wide, seed, refuted)
+    again = search(asked.evidence, asked.base, asked.field, asked.wide, seed, refuted)
     _check_signals(again, recording, holdout)
-    again = _verified(again, asked, structure, seed)
+    again = _verified(again, asked, seed)
     errors = [verification.error(each.last, asked.held, each.rephased) for each in (found, again)]
     return asked, again if _names(again) > _names(found) and errors[1] < errors[0] else found
 
@@ -144,19 +145,19 @@ def _names(found: Named) -> frozenset[str]:
     return frozenset(taken.trial.candidate.effect.name for taken in found.taken)
 
 
-def pursue(recording, holdout, structure, seed) -> tuple[Question, Named]:
+def pursue(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
     """The question, put again if what was found changes how force and motion are aligned."""
-    asked = ask(recording, holdout, structure)
-    found = search(asked.evidence, asked.base, structure, asked.wide, seed)
+    asked = ask(recording, holdout, structure, before=before)
+    found = search(asked.evidence, asked.base, asked.field, asked.wide, seed)
     if found.taken:
-        again = ask(recording, holdout, structure, found.last)
+        again = ask(recording, holdout, structure, found.last, asked)
         if abs(again.delay - asked.delay) > ALIGNED * asked.evidence.limits.interval:
             asked = again
-            found = search(asked.evidence, asked.base, structure, asked.wide, seed)
+            found = search(asked.evidence, asked.base, asked.field, asked.wide, seed)
     return asked, found
 
 
-def _verified(found: Named, asked: Question, structure, seed) -> Named:
+def _verified(found: Named, asked: Question, seed) -> Named:
     """Without terms that do not help on the held-out recording."""
     if asked.held is None:
         return found
@@ -176,7 +177,7 @@ def _verified(found: Named, asked: Question, structure, seed) -> Named:
             found = found._replace(taken=taken)
             continue
         taken = [t for i, t in enumerate(found.taken) if i != number]
-        left = contest(evidence, less, Field(evidence, structure), seed)
+        left = contest(evidence, less, asked.field, seed)
         found = found._replace(last=less, taken=taken, left=left)
     return found
 

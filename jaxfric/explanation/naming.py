@@ -7,7 +7,6 @@ import numpy as np
 
 from ..catalogue import Effect
 from ..terms import ElasticBacklash
-from ..terms.base import AbstractTerm
 from .candidates import Field
 from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
@@ -60,20 +59,20 @@ class Named(NamedTuple):
 def search(
     evidence: Evidence,
     base: Fit,
-    structure: AbstractTerm,
+    field: Field,
     wide: Evidence | None = None,
     seed: int = 0,
     refuted: frozenset[str] = frozenset(),
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
-    **Arguments:** `wide`: the recording through a kernel of twice the width, where terms that act
-    on derivatives of the force must show alike; `refuted`: effects that are out of question.
+    **Arguments:** `field`: the candidates; `wide`: the recording through a kernel of twice the
+    width, where terms that act on derivatives of the force must show alike; `refuted`: effects
+    that are out of question.
     """
     now = base
     taken: list[Taken] = []
     evidence = with_predictions(evidence, now)
-    field = Field(evidence, structure)
     visited: set[tuple[str, ...]] = set()
     while True:
         round_ = contest(evidence, now, field, seed)

@@ -8,6 +8,7 @@ import numpy as np
 from .. import terms as laws
 from ..recording import Recording
 from ..terms.base import AbstractTerm
+from .candidates import Field
 from .chance import blocks
 from .evidence import Evidence, gather
 from .predictions import with_predictions
@@ -22,7 +23,8 @@ class Question(NamedTuple):
     """A recording through a kernel and one of twice the width, its base fit, the held-out one.
 
     `delay`: how much later the force was taken, s; `block`: of each row; `structure`: the baseline;
-    `reversals`: whether rows reach across reversals, where the axis moves instead of sticking.
+    `field`: the candidates, with their columns; `reversals`: whether rows reach across reversals,
+    where the axis moves instead of sticking.
     """
 
     evidence: Evidence
@@ -31,6 +33,7 @@ class Question(NamedTuple):
     base: Fit
     block: np.ndarray
     structure: AbstractTerm
+    field: Field
     delay: float
     reversals: bool = False
 
@@ -40,42 +43,52 @@ def ask(
     holdout: Recording | None,
     structure: AbstractTerm,
     known: Fit | None = None,
+    before: Question | None = None,
 ) -> Question:
     """The rows of recording and held-out recording, force and motion aligned.
 
-    **Arguments:** `known`: the model to align by, by default the baseline.
+    **Arguments:** `known`: the model to align by, by default the baseline; `before`: a question
+    about the same baseline, whose columns serve again if only the force has been shifted since.
     """
     motion = from_position(recording)
     evidence = gather(motion)
-    wide, delay, sample = _wider(motion, evidence.width), 0.0, evidence.limits.interval
+    wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
     known = fit([structure], evidence) if known is None else known
     # To first order a delay is a column; the first estimate is good to a fifth of a sample.
     for _ in range(3):
-        before = delay
+        last = delay
         delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
         if abs(delay) > sample:
             delay = -0.5 * sample
         evidence = gather(motion, evidence.width, delay)
         wide = None if wide is None else gather(motion, wide.width, delay)
-        if abs(delay - before) < 0.5 * ALIGNED * sample:
+        if abs(delay - last) < 0.5 * ALIGNED * sample:
             break
     across = yields(motion, evidence, known)
     if across:
         evidence = gather(motion, evidence.width, delay, across)
-        wide = gather(motion, 2 * evidence.width, delay, across)
+        wide = _wider(motion, evidence, delay, across)
     held = None
     if holdout is not None:
         held = gather(from_position(holdout), evidence.width, delay, across)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    return Question(evidence, wide, held, base, block, structure, delay, across)
+    field = None if before is None else before.field
+    if field is None or not field.fits(evidence):
+        field = Field(evidence, structure)
+    return Question(evidence, wide, held, base, block, structure, field, delay, across)
 
 
-def _wider(recording: Recording, width: int) -> Evidence | None:
+def _wider(recording: Recording, narrow: Evidence, delay=0.0, across=False) -> Evidence | None:
+    """The recording through a kernel of twice the width; `None` if too few rows are left to judge
+    by.
+    """
     try:
-        return gather(recording, 2 * width)
-    except ValueError:  # too few rows are left between the reversals
+        wide = gather(recording, 2 * narrow.width, delay, across)
+        blocks(wide.elapsed[wide.centre], wide.reach)
+    except ValueError:
         return None
+    return wide
 
 
 def from_position(recording: Recording) -> Recording:
