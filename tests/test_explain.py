@@ -15,6 +15,7 @@ from jaxfric.explanation import (
     candidates,
     evidence,
     explain,
+    explaining,
     locate,
     naming,
     parameters,
@@ -329,13 +330,17 @@ def test_what_the_held_out_recording_did_not_record_is_not_asked(healthy):
 
 
 def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
-    speed = jnp.cos(3.0 * healthy[0].time)
-    run = dataclasses.replace(healthy[0], channels={"neighbour_velocity": speed})
-    run = planted(run, terms.CrossAxis(), (0.2, 4.0))
+    speed = {"neighbour_velocity": jnp.cos(3.0 * healthy[0].time)}
+    run = dataclasses.replace(healthy[0], channels=speed)
     lacking = dataclasses.replace(healthy[1], source="other.csv")
+    candidate = candidates.Candidate(EFFECTS["cross_axis"], terms.CrossAxis(), np.zeros((1, 0)))
+    trial = types.SimpleNamespace(candidate=candidate)
+    found = types.SimpleNamespace(taken=[types.SimpleNamespace(trial=trial)])
     message = "other.csv lacks 'neighbour_velocity', by which .* cross axis.*Add the signal"
     with pytest.raises(ValueError, match=message):
-        explain(run, "gaussian", lacking)
+        explaining._check_signals(found, run, lacking)
+    explaining._check_signals(found, run, run)
+    explaining._check_signals(found, run, None)
 
 
 def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
