@@ -203,7 +203,11 @@ def test_two_processes_share_a_fleet(tmp_path):
         port = free.getsockname()[1]
     environment = os.environ | {"PYTHONPATH": str(ROOT), "JAXFRIC_CACHE": "off"}
     command = [sys.executable, "-m", "jaxfric", "fleet", str(folder), "--out", str(out)]
-    command += ["--jobs", "1", *MODEL, "--process"]
+    # What is left of another model is in the way of neither.
+    for part in range(2):
+        with journal.Journal(out, {"model": "lorentzian"}, part):
+            pass
+    command += ["--jobs", "1", *MODEL, "--restart", "--process"]
     both = [
         subprocess.Popen([*command, f"{i}/2@127.0.0.1:{port}"], env=environment) for i in range(2)
     ]

@@ -10,7 +10,7 @@ from pathlib import Path
 import jax
 
 from .. import fleet
-from ..fleet import journal, tables, telling
+from ..fleet import journal, running, tables, telling
 from ..io import write_bytes
 from .commands import check_bounds, show_progress
 
@@ -33,6 +33,7 @@ def run(arguments: Namespace) -> int:
         pictures.library()
     if arguments.restart:
         journal.forget(arguments.out, jax.process_index(), jax.process_count())
+        running.together("restart")
     progress = Progress(len(files))
     kept, rows = fleet.run(
         files, arguments.out, _options(arguments), jobs=_jobs(arguments), tell=progress

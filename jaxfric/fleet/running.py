@@ -66,7 +66,7 @@ def run(
             journal.add(rows)
             new += len(rows)
             tell(known + new, new, len(files))
-        _together()
+        together("rows")
     return journal, journal.rows(files)
 
 
@@ -84,9 +84,9 @@ def _rows(files: Sequence[File], options: Options, jobs: int) -> Iterator[list[t
         yield rows
 
 
-def _together() -> None:
-    """Wait until every process has come this far."""
+def together(point: str) -> None:
+    """Wait until every process has come as far as this point."""
     if jax.process_count() > 1:
         from jax.experimental import multihost_utils
 
-        multihost_utils.sync_global_devices("jaxfric.fleet")
+        multihost_utils.sync_global_devices(f"jaxfric.fleet.{point}")
