@@ -348,9 +348,9 @@ def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     motion = question.from_position(healthy[0])
     seen = evidence.gather(motion)
     field = candidates.Field(seen, gaussian)
-    assert field.fits(evidence.gather(motion, seen.width, delay=3e-4))
-    assert not field.fits(evidence.gather(motion, 2 * seen.width))
-    assert not field.fits(evidence.gather(question.from_position(healthy[1]), seen.width))
+    assert field.serves(evidence.gather(motion, seen.width, delay=3e-4))
+    assert not field.serves(evidence.gather(motion, 2 * seen.width))
+    assert not field.serves(evidence.gather(question.from_position(healthy[1]), seen.width))
     first = question.ask(healthy[0], None, gaussian)
     again = question.ask(healthy[0], None, gaussian, first.base, first)
     assert again.field is first.field

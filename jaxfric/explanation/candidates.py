@@ -96,9 +96,10 @@ class Field:
         self._motion, self._rows, self._reach = evidence.motion, evidence.rows, evidence.reach
         self._kept: dict[int, np.ndarray] = {}
 
-    def fits(self, evidence: Evidence) -> bool:
-        """Whether the columns are those of other evidence: the same rows of the same motion, of
-        which the force plays no part.
+    def serves(self, evidence: Evidence) -> bool:
+        """Whether the columns are those of other evidence too: the same rows of the same motion.
+
+        Of the force only its magnitude enters, by the compact sets, and a shift in time leaves it.
         """
         ours, theirs = _signals(self._motion), _signals(evidence.motion)
         known = ours.keys() == theirs.keys() and self._reach == evidence.reach

@@ -191,7 +191,7 @@ def lengthened(recording: Recording) -> Recording:
     """The recording with its velocity, of one of few lengths, so that few programs are compiled."""
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", num_segments=1)
-    return signals.prepare(pad(nameless, _rounded(recording.num_samples)))
+    return signals.prepare(pad(nameless, _length(recording.num_samples)))
 
 
 _scales = eqx.filter_jit(signals.scales)
@@ -205,7 +205,7 @@ def _widest(recording: Recording) -> int:
     return max(16, int(np.count_nonzero(np.asarray(recording.mask))) // KERNELS)
 
 
-def _rounded(count: int) -> int:
+def _length(count: int) -> int:
     """The next power of two, or three quarters of it, so that few programs are compiled."""
     octave = max(256, 1 << (count - 1).bit_length())
     return octave if count > octave * 3 // 4 else octave * 3 // 4
@@ -298,9 +298,9 @@ def _averaged(weights: np.ndarray) -> np.ndarray:
 
 
 def _padded(parts: dict, recording: Recording) -> Recording:
-    """The nodes as a recording, lengthened as [`_rounded`][] says."""
+    """The nodes as a recording, lengthened as [`_length`][] says."""
     count = len(parts["time"])
-    length = _rounded(count)
+    length = _length(count)
 
     def pad(values):
         return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))

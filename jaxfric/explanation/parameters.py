@@ -85,9 +85,10 @@ def with_elsewhere(ours: dict[str, Estimate], there: dict[str, Estimate]) -> dic
     """Estimates whose errors contain what another recording of the same machine says.
 
     No law is quite the machine's, and what it lacks moves the parameters from motion to motion by
-    more than the noise does. Two values further apart than their errors allow have an error in
-    common to both, here its moment estimate (DerSimonian & Laird 1986). What a recording does not
-    show, it says nothing about: parameters with no finite error there stay.
+    more than the noise does. Where two values are further apart than their errors allow, each has
+    beside its own error one of the variance between recordings, here its moment estimate
+    (DerSimonian & Laird 1986). What a recording does not show, it says nothing about: parameters
+    with no finite error there stay.
     """
     return _widened(ours, there, lambda own, there, apart: (apart**2 - own**2 - there**2) / 2)
 

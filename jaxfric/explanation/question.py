@@ -74,7 +74,7 @@ def ask(
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     field = None if before is None else before.field
-    if field is None or not field.fits(evidence):
+    if field is None or not field.serves(evidence):
         field = Field(evidence, structure)
     return Question(evidence, wide, held, base, block, structure, field, delay, across)
 

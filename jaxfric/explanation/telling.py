@@ -219,8 +219,8 @@ def _estimates(found: Named, asked: Question, rest, units) -> list[dict[str, Est
         there = _seen_by(where.held, lasting, count, units)
         own = {id(term): values for term, values in zip(lasting.terms, there, strict=True)}
         both = [
-            spelled.with_elsewhere(ours, own.get(id(term), ours))
-            for term, ours in zip(left.last.terms, both, strict=True)
+            spelled.with_elsewhere(mine, own.get(id(term), mine))
+            for term, mine in zip(left.last.terms, both, strict=True)
         ]
     return both + late
 

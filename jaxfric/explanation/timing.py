@@ -74,8 +74,8 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
     wide = time
     if asked.wide is not None:
         wide = _least(ways[best], motion, asked, found, place, time, 2 * width)[1]
-    # By Richardson's rule, as in `parameters.with_smoothing`; and nobody wrote down when in its
-    # period a sample of the force was taken.
+    # Smoothing errs with the square of the width, so a third of what doubling it changes is left
+    # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
     smoothed = float(np.hypot((wide - time) / 3, asked.evidence.limits.interval / np.sqrt(12)))
     return Late(time, ways[best], place, _renamed(taken, best, rivals), smoothed)
 

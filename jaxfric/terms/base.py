@@ -51,7 +51,8 @@ class Scales(NamedTuple):
 
     `slowest`: the smallest speed resolved as slip, m/s. `fastest`: the 98 % quantile of the
     speed, m/s. `low`, `high`: the range of the position, m. `force`: root mean square, N.
-    `duration`: s. `interval`: the typical sampling interval, s. All scalars.
+    `start`: the first time stamp, s. `duration`: s. `interval`: the typical sampling interval, s.
+    All scalars.
     """
 
     slowest: Float[Array, ""]
