@@ -1,7 +1,8 @@
 """The terms that compete for a residual, with the places of their nonlinear parameters to try."""
 
+import copy
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,14 +107,19 @@ class Field:
         pairs = ((ours[name], theirs[name]) for name in ours if known)
         return known and all(np.array_equal(*p) for p in [(self._rows, evidence.rows), *pairs])
 
-    def columns(self, number: int, evidence: Evidence) -> np.ndarray:
+    def only(self, names: Container[str]) -> "Field":
+        """The candidates of some effects, by name; both keep what either has made."""
+        part = copy.copy(self)
+        part.candidates = [c for c in self.candidates if c.effect.name in names]
+        return part
+
+    def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
         """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
-        candidate = self.candidates[number]
         if any(name.startswith("predicted_") for name in candidate.term.coordinates):
             return scaled(candidate.columns(evidence))
-        if number not in self._kept:
-            self._kept[number] = scaled(candidate.columns(evidence))
-        return self._kept[number]
+        if id(candidate) not in self._kept:
+            self._kept[id(candidate)] = scaled(candidate.columns(evidence))
+        return self._kept[id(candidate)]
 
 
 def _signals(motion: Recording) -> dict[str, Any]:

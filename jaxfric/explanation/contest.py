@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..terms import DisturbancePulses
+from ..terms import Cogging, DisturbancePulses
 from .candidates import Candidate, Field, scaled
 from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
@@ -75,12 +75,12 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     judge = Judge(now, block, seed)
 
-    def scanned(number: int) -> tuple[Scan, np.ndarray]:
-        raw = field.columns(number, seen)
-        scan = judge(raw, field.candidates[number].effect.positive)
+    def scanned(candidate: Candidate) -> tuple[Scan, np.ndarray]:
+        raw = field.columns(candidate, seen)
+        scan = judge(raw, candidate.effect.positive)
         return scan, raw[scan.best : scan.best + 1]
 
-    scans, best = zip(*map(scanned, range(len(field.candidates))), strict=True)
+    scans, best = zip(*map(scanned, field.candidates), strict=True)
     drawn = np.array([s.drawn for s in scans])
     p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
     least = thresholds(drawn, LEVEL)
@@ -127,6 +127,9 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
         if bent and _imitated(trial, now):
             again = _afresh(seen, now, trial)
             found = again if found is None or again.energy < found.energy else found
+        if found is not None and _overshadowed(trial, found.alpha):
+            trial = _overtone(trial, found)
+            found = _refined(seen, now, trial, basis)
         if found is None or not _sensible(trial, found.alpha):
             continue
         gain = 1 - found.energy / now.energy
@@ -137,16 +140,29 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
 
 
 def _sensible(trial: Trial, alpha: np.ndarray) -> bool:
-    """Whether magnitudes are positive, and the first of several harmonics is no bystander.
+    """Whether magnitudes are positive."""
+    return not (trial.candidate.effect.positive and np.any(alpha < 0))
 
-    A wave whose fundamental is under a quarter of its strongest harmonic is that harmonic's.
-    """
-    if trial.candidate.effect.positive and np.any(alpha < 0):
-        return False
+
+def _overshadowed(trial: Trial, alpha: np.ndarray) -> bool:
+    """Whether the first of several harmonics is a bystander: under a quarter of the strongest."""
     if trial.candidate.lines is None or len(alpha) == 2:
-        return True
+        return False
     size = np.hypot(alpha[::2], alpha[1::2])
-    return bool(size[0] >= 0.25 * size.max())
+    return bool(size[0] < 0.25 * size.max())
+
+
+def _overtone(trial: Trial, found: Finalist) -> Trial:
+    """The strongest harmonic as a wave of its own, to be believed from the threshold of them all.
+
+    It may be finer than what is scanned for, and stand out only at the slowest rows.
+    """
+    size = np.hypot(found.alpha[::2], found.alpha[1::2])
+    candidate = trial.candidate
+    beta = found.betas[-1] / (1 + int(np.argmax(size)))
+    lines = candidate.lines._replace(harmonics=1)
+    alone = candidate._replace(term=Cogging(harmonics=1), betas=beta[None], lines=lines)
+    return trial._replace(candidate=alone, beta=beta, dimension=2, p_value=1.0)
 
 
 def _refined(seen, now, trial, basis) -> Finalist:

@@ -13,7 +13,7 @@ from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .plausible import plausible
 from .predictions import with_predictions
-from .regression import Fit, fast, fit
+from .regression import Fit, fast, fit, without
 
 # A term is believed if it accounts for this much of the mean-square residual, too: below it, the
 # amplitude is under a sixth of the residual's, where held forces, counts and smoothed velocities
@@ -72,29 +72,49 @@ def search(
     """
     now = base
     taken: list[Taken] = []
-    evidence = with_predictions(evidence, now)
-    visited: set[tuple[str, ...]] = set()
-    while True:
-        round_ = contest(evidence, now, field, seed)
+
+    def next_one(seen, now, taken, field) -> tuple[Contest, Finalist | None]:
+        round_ = contest(seen, now, field, seed)
         machines = [
             f
             for f in round_.finalists
-            if f.trial.candidate.effect.name not in refuted and plausible(f, now, evidence)
+            if f.trial.candidate.effect.name not in refuted and plausible(f, now, seen)
         ]
         round_ = round_._replace(finalists=machines)
-        best = _believed(round_, now, evidence, wide, base, taken)
+        best = _believed(round_, now, seen, wide, base, taken)
+        return round_, best if best is None else _plainer(best, round_)
+
+    evidence = with_predictions(evidence, now)
+    visited: set[tuple[str, ...]] = set()
+    while True:
+        round_, best = next_one(evidence, now, taken, field)
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
-            return Named(base, now, taken, round_)
+            break
         visited.add(names)
-        best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
-        taken.append(Taken(best.trial, rivals, best.p_value))
-        terms = (*now.terms, best.trial.candidate.term)
-        now = fit(terms, evidence, best.betas)
-        evidence = with_predictions(evidence, now)
-        now = fit(terms, evidence, now.betas, 4)
+        now, taken, evidence = _joined(best, round_, evidence, now, taken)
         now, taken = _pruned(evidence, now, taken, round_.size)
+    # What came early was chosen before the rest was known: its rivals are asked again.
+    for own in [t for t in taken[:-1] if t.rivals]:
+        place = next(i for i, t in enumerate(taken) if t is own)
+        others = [t for t in taken if t is not own]
+        less = without(now, evidence, len(now.terms) - len(taken) + place)
+        seen, name = with_predictions(evidence, less), own.trial.candidate.effect.name
+        again, best = next_one(seen, less, others, field.only({name, *own.rivals}))
+        if best is not None and best.trial.candidate.effect.name != name:
+            now, taken, evidence = _joined(best, again, seen, less, others)
+    return Named(base, now, taken, round_)
+
+
+def _joined(best: Finalist, round_: Contest, evidence, now: Fit, taken: list[Taken]):
+    """The model, the terms taken and the evidence with the winner of a contest."""
+    best, rivals = _rivals(best, round_, now, evidence)
+    terms = (*now.terms, best.trial.candidate.term)
+    now = fit(terms, evidence, best.betas)
+    evidence = with_predictions(evidence, now)
+    now = fit(terms, evidence, now.betas, 4)
+    return now, [*taken, Taken(best.trial, rivals, best.p_value)], evidence
 
 
 # Of the idealisations of a reversal none is right to the last tenth of its score, and a law of
@@ -189,6 +209,7 @@ REVERSAL_OF_BASE = 0.25
 def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[Taken]):
     least = LATER_SHARE if taken else LEAST_SHARE
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
+    before = [t.trial.candidate.effect for t in taken]
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy
         enough = gained >= max(least * now.energy, floor)
@@ -196,9 +217,8 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
             # Every axis has a load that wanders; no larger than the noise it is a part of it.
             enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
-            before = [t.trial.candidate.effect for t in taken]
-            part = part_of_base(finalist.trial.candidate.effect, before)
-            enough &= gained >= part * base.energy
+            effect = finalist.trial.candidate.effect
+            enough &= gained >= least_gain(effect, before, base.energy, now.energy)
             enough &= not _again(finalist, taken)
         sharp = finalist.trial.candidate.effect.name in SHARP
         dynamic = isinstance(finalist.trial.candidate.term, ElasticBacklash)
@@ -211,18 +231,28 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
     return None
 
 
-def part_of_base(effect: Effect, before: Sequence[Effect]) -> float:
-    """The part of what the base left that a later term must account for."""
-    name = effect.name
+# What a law of not quite the right shape leaves has no law's shape, so that a law which takes
+# three quarters of what is left, however little, is no stand-in for that: the remainder is down by
+# half in amplitude. Laws on the force's derivatives and those of a reversal can take any shape.
+MOST = 0.75
+
+
+def least_gain(effect: Effect, before: Sequence[Effect], base: float, left: float) -> float:
+    """The energy that a term after others must account for, N².
+
+    **Arguments:** `before`: the effects taken already; `base` and `left`: the energy that the base
+    left, and that they leave.
+    """
     parts = [OF_BASE]
     if any(earlier.first_order for earlier in before):
         parts.append(OF_BASE_ROUGH)
-    if name in EASY:
-        parts.append(EASY_OF_BASE)
-    switching = name in AT_REVERSALS or name == "disturbance_pulses"
+    switching = effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"
     if switching and any(earlier.name in AT_REVERSALS for earlier in before):
         parts.append(REVERSAL_OF_BASE)
-    return max(parts)
+    if effect.name in EASY:
+        parts.append(EASY_OF_BASE)
+    least = max(parts) * base
+    return least if switching or effect.name in EASY else min(least, MOST * left)
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:
@@ -256,8 +286,7 @@ def _pruned(evidence, now, taken, size):
     """Without the earlier terms that the newest one has made idle."""
     start = len(now.terms) - len(taken)
     for place in reversed(range(start, len(now.terms) - 1)):
-        keep = [i for i in range(len(now.terms)) if i != place]
-        less = fit([now.terms[i] for i in keep], evidence, [now.betas[i] for i in keep], 6)
+        less = without(now, evidence, place)
         gain = 1 - now.energy / less.energy
         if taken[place - start].trial.score(gain, size) <= 0 or gain < LEAST_SHARE:
             now = less

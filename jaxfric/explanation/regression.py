@@ -177,6 +177,12 @@ def fit(
     return _refine(terms, rows, space, place, iterations)
 
 
+def without(now: Fit, evidence: Evidence, number: int) -> Fit:
+    """A fit done again without one of its terms."""
+    keep = [i for i in range(len(now.terms)) if i != number]
+    return fit([now.terms[i] for i in keep], evidence, [now.betas[i] for i in keep], 6)
+
+
 def _at(terms, evidence, space, place, derivatives=False) -> Fit:
     """The fit at given coordinates of β; with the derivatives by the coordinates' β."""
     betas = space.split(space.beta(place))

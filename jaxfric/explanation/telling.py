@@ -165,7 +165,7 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
         effect = taken.trial.candidate.effect
         if "step_time" in parameters:
             parameters = _dated(parameters, asked.evidence)
-        less = verification.without(found, seen, number)
+        less = verification.lacking(found, seen, number)
         share = (less.energy - found.last.energy) / first.energy
         held = None
         if asked.held is not None and effect.name not in OF_THE_MOMENT:

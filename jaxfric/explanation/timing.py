@@ -6,7 +6,7 @@ better account, by how much noise of the force each of them would leave on its o
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -18,10 +18,10 @@ from ..recording import Recording
 from .candidates import Candidate
 from .contest import RIVAL
 from .evidence import gather
-from .naming import Named, Taken, part_of_base
+from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .question import Question, from_position
-from .regression import fit
+from .regression import fit, without
 
 LATE = (laws.TransportDelay, laws.ActuatorLag)
 # Times tried, in parts of the first-order estimate, which errs by its own second order.
@@ -101,12 +101,13 @@ def settled(
     known = lateness.taken.trial.candidate
     for number in reversed(range(len(others))):
         place = len(left.terms) - len(others) + number
-        less = fit(_but(left.terms, place), seen, _but(left.betas, place), 6)
-        # As for any later term: a part of what the baseline left, not only of what is left now.
+        less = without(left, seen, place)
+        # As for any later term.
         before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
-        part = part_of_base(others[number].trial.candidate.effect, before)
-        if less.energy - left.energy < part * found.base.energy:
-            left, others = less, _but(others, number)
+        effect = others[number].trial.candidate.effect
+        least = least_gain(effect, before, found.base.energy, less.energy)
+        if less.energy - left.energy < least:
+            left, others = less, [t for i, t in enumerate(others) if i != number]
     evidence = with_predictions(asked.evidence, left)
     now = fit((*left.terms, known.term), evidence, [*left.betas, np.zeros(0)], 6)
     now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
@@ -114,11 +115,6 @@ def settled(
     taken = [*others, lateness.taken]
     found = found._replace(last=now, taken=taken, left=behind.left, smoothed=lateness.smoothed)
     return found, rest
-
-
-def _but(items: Sequence, place: int) -> list:
-    """All items but one."""
-    return [item for i, item in enumerate(items) if i != place]
 
 
 def _least(undo: Callable, motion, asked, found, place, guess, width) -> tuple[float, float]:

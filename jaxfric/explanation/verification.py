@@ -7,7 +7,7 @@ from .contest import Contest
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
-from .regression import Fit, fast, fit
+from .regression import Fit, fast, without
 
 # What belongs to a moment of one recording says nothing about another.
 _MOMENTARY = (
@@ -80,12 +80,9 @@ def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) 
     return float(np.sqrt(power / max(evidence.target @ evidence.target, 1e-300)))
 
 
-def without(named: Named, evidence: Evidence, number: int) -> Fit:
+def lacking(named: Named, evidence: Evidence, number: int) -> Fit:
     """The model refitted without the found term of that number."""
-    place = len(named.last.terms) - len(named.taken) + number
-    keep = [i for i in range(len(named.last.terms)) if i != place]
-    terms = [named.last.terms[i] for i in keep]
-    return fit(terms, evidence, [named.last.betas[i] for i in keep], 6)
+    return without(named.last, evidence, len(named.last.terms) - len(named.taken) + number)
 
 
 def share(

@@ -139,10 +139,16 @@ class HardeningSpring(AbstractLaw):
         return ((sample.position - self.spring_centre) ** 3,)
 
 
-def _outer(scales):
-    """Anywhere but the outermost 2 %, where fewer samples than a fit needs would touch it."""
-    margin = 0.02 * _stroke(scales)
-    return scales.low + margin, scales.high - margin
+def _upper(scales):
+    """Above the middle: what presses over more than half of the stroke is a spring, and no stop;
+    but for the outermost 2 %, where fewer samples than a fit needs would touch it.
+    """
+    return scales.high - 0.5 * _stroke(scales), scales.high - 0.02 * _stroke(scales)
+
+
+def _lower(scales):
+    """Below the middle, likewise."""
+    return scales.low + 0.02 * _stroke(scales), scales.low + 0.5 * _stroke(scales)
 
 
 class EndStop(AbstractLaw):
@@ -153,7 +159,7 @@ class EndStop(AbstractLaw):
 
     stop_position: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("stop_stiffness", STIFFNESS),)
-    nonlinear: ClassVar = (Parameter("stop_position", POSITION, _outer, logarithmic=False),)
+    nonlinear: ClassVar = (Parameter("stop_position", POSITION, _upper, logarithmic=False),)
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
@@ -168,7 +174,7 @@ class LowerEndStop(AbstractLaw):
 
     lower_stop_position: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("lower_stop_stiffness", STIFFNESS),)
-    nonlinear: ClassVar = (Parameter("lower_stop_position", POSITION, _outer, logarithmic=False),)
+    nonlinear: ClassVar = (Parameter("lower_stop_position", POSITION, _lower, logarithmic=False),)
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
