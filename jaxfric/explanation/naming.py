@@ -191,11 +191,11 @@ LINEARITY = 2e-3
 RAREST = 1.5 / (1 + DRAWS)
 
 
-# What comes after stronger terms must also be this part of what the base left: no term has quite
-# the shape of what it stands for, and a twentieth of its amplitude may stay; a tenth where the term
-# is but the first order of its effect.
-OF_BASE = 0.002
-OF_BASE_ROUGH = 0.01
+# What comes after stronger terms must also be this part of what the base left, or most of what
+# they leave: no term has quite the shape of what it stands for, and a tenth of its amplitude may
+# stay. No law has the shape of that remainder either, so that it takes the smaller part of it.
+OF_BASE = 0.01
+MOST = 0.5
 # Isolated pushes besides another effect are mostly where that effect switches, and terms on the
 # force's own derivatives take what a strong effect leaves through the kernel.
 EASY_OF_BASE = 0.05
@@ -231,28 +231,18 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
     return None
 
 
-# What a law of not quite the right shape leaves has no law's shape, so that a law which takes
-# three quarters of what is left, however little, is no stand-in for that: the remainder is down by
-# half in amplitude. Laws on the force's derivatives and those of a reversal can take any shape.
-MOST = 0.75
-
-
 def least_gain(effect: Effect, before: Sequence[Effect], base: float, left: float) -> float:
     """The energy that a term after others must account for, N².
 
     **Arguments:** `before`: the effects taken already; `base` and `left`: the energy that the base
     left, and that they leave.
     """
-    parts = [OF_BASE]
-    if any(earlier.first_order for earlier in before):
-        parts.append(OF_BASE_ROUGH)
-    switching = effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"
-    if switching and any(earlier.name in AT_REVERSALS for earlier in before):
-        parts.append(REVERSAL_OF_BASE)
+    again = any(earlier.name in AT_REVERSALS for earlier in before)
+    if again and (effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"):
+        return REVERSAL_OF_BASE * base
     if effect.name in EASY:
-        parts.append(EASY_OF_BASE)
-    least = max(parts) * base
-    return least if switching or effect.name in EASY else min(least, MOST * left)
+        return EASY_OF_BASE * base
+    return min(OF_BASE * base, MOST * left)
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:
