@@ -235,6 +235,13 @@ def column(term, recording, k=0):
     return float(term.columns(recording)[0, k])
 
 
+def test_a_stop_is_met_in_its_own_half_of_the_stroke():
+    run = Recording([0.0, 1.0], [0.0, 0.0], [-1.0, 3.0], [1.0, 1.0])
+    limits = signals.scales(run)
+    upper, lower = (term.nonlinear[0].bounds(limits) for term in (T.EndStop(), T.LowerEndStop()))
+    np.testing.assert_allclose([*upper, *lower], [1.0, 2.92, -0.92, 1.0])
+
+
 def test_values_by_hand():
     assert column(T.Cogging(0.01), at(x=0.0025)) == pytest.approx(1.0)
     assert column(T.Cogging(0.01, 2), at(x=0.00125), 2) == pytest.approx(1.0)

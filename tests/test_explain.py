@@ -13,6 +13,7 @@ from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.effects import EFFECTS
 from jaxfric.explanation import (
     candidates,
+    contest,
     evidence,
     explain,
     explaining,
@@ -361,6 +362,32 @@ def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healt
     assert asked.wide is not None
     monkeypatch.setattr("jaxfric.explanation.chance.FEWEST", 10_000)
     assert question._wider(question.from_position(healthy[0]), asked.evidence) is None
+
+
+def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
+    gaussian = models.named("gaussian")
+    scanned = evidence.gather(question.from_position(healthy[0]))
+    pitch = 1 / (1.5 * candidates.line_frequencies(scanned, "position")[-1])
+    run = planted(healthy[0], terms.Cogging(), (3.0, 1.0), (pitch,))
+    asked = question.ask(run, None, gaussian)
+    seen = predictions.with_predictions(asked.evidence, asked.base)
+    best = contest.contest(seen, asked.base, asked.field).finalists[0]
+    assert best.trial.candidate.effect.name == "cogging"
+    assert best.trial.candidate.term.harmonics == 1
+    assert best.p_value <= contest.LEVEL
+    np.testing.assert_allclose(best.betas[-1], pitch, rtol=0.005)
+
+
+def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
+    def least(name, *before, left):
+        return naming.least_gain(EFFECTS[name], [EFFECTS[n] for n in before], 1.0, left)
+
+    assert least("gain_asymmetry", "spring", left=0.5) == 0.01
+    assert least("gain_asymmetry", "spring", left=0.004) == 0.002
+    assert least("backlash", "spring", left=0.004) == 0.002
+    assert least("backlash", "presliding", left=0.004) == 0.25
+    assert least("disturbance_pulses", "presliding", left=0.004) == 0.25
+    assert least("transport_delay", "spring", left=0.004) == 0.05
 
 
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):

@@ -1,8 +1,7 @@
 """The terms that compete for a residual, with the places of their nonlinear parameters to try."""
 
-import copy
 import dataclasses
-from collections.abc import Container, Iterator
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,12 +105,6 @@ class Field:
         known = ours.keys() == theirs.keys() and self._reach == evidence.reach
         pairs = ((ours[name], theirs[name]) for name in ours if known)
         return known and all(np.array_equal(*p) for p in [(self._rows, evidence.rows), *pairs])
-
-    def only(self, names: Container[str]) -> "Field":
-        """The candidates of some effects, by name; both keep what either has made."""
-        part = copy.copy(self)
-        part.candidates = [c for c in self.candidates if c.effect.name in names]
-        return part
 
     def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
         """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""

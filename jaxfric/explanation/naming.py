@@ -72,49 +72,29 @@ def search(
     """
     now = base
     taken: list[Taken] = []
-
-    def next_one(seen, now, taken, field) -> tuple[Contest, Finalist | None]:
-        round_ = contest(seen, now, field, seed)
-        machines = [
-            f
-            for f in round_.finalists
-            if f.trial.candidate.effect.name not in refuted and plausible(f, now, seen)
-        ]
-        round_ = round_._replace(finalists=machines)
-        best = _believed(round_, now, seen, wide, base, taken)
-        return round_, best if best is None else _plainer(best, round_)
-
     evidence = with_predictions(evidence, now)
     visited: set[tuple[str, ...]] = set()
     while True:
-        round_, best = next_one(evidence, now, taken, field)
+        round_ = contest(evidence, now, field, seed)
+        machines = [
+            f
+            for f in round_.finalists
+            if f.trial.candidate.effect.name not in refuted and plausible(f, now, evidence)
+        ]
+        round_ = round_._replace(finalists=machines)
+        best = _believed(round_, now, evidence, wide, base, taken)
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
-            break
+            return Named(base, now, taken, round_)
         visited.add(names)
-        now, taken, evidence = _joined(best, round_, evidence, now, taken)
+        best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
+        taken.append(Taken(best.trial, rivals, best.p_value))
+        terms = (*now.terms, best.trial.candidate.term)
+        now = fit(terms, evidence, best.betas)
+        evidence = with_predictions(evidence, now)
+        now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
-    # What came early was chosen before the rest was known: its rivals are asked again.
-    for own in [t for t in taken[:-1] if t.rivals]:
-        place = next(i for i, t in enumerate(taken) if t is own)
-        others = [t for t in taken if t is not own]
-        less = without(now, evidence, len(now.terms) - len(taken) + place)
-        seen, name = with_predictions(evidence, less), own.trial.candidate.effect.name
-        again, best = next_one(seen, less, others, field.only({name, *own.rivals}))
-        if best is not None and best.trial.candidate.effect.name != name:
-            now, taken, evidence = _joined(best, again, seen, less, others)
-    return Named(base, now, taken, round_)
-
-
-def _joined(best: Finalist, round_: Contest, evidence, now: Fit, taken: list[Taken]):
-    """The model, the terms taken and the evidence with the winner of a contest."""
-    best, rivals = _rivals(best, round_, now, evidence)
-    terms = (*now.terms, best.trial.candidate.term)
-    now = fit(terms, evidence, best.betas)
-    evidence = with_predictions(evidence, now)
-    now = fit(terms, evidence, now.betas, 4)
-    return now, [*taken, Taken(best.trial, rivals, best.p_value)], evidence
 
 
 # Of the idealisations of a reversal none is right to the last tenth of its score, and a law of
