@@ -97,6 +97,12 @@ def test_machines_spread_over_units_and_sample_rates():
         assert 6 <= machine.plan.samples / machine.plan.sample_rate <= 60.1
 
 
+def test_the_flanks_of_a_gap_give_way_by_less_than_it():
+    for seed in range(60, 72):
+        truth = concealed.draw(seed, ("backlash",)).truth["backlash"]
+        assert 0 < truth["windup"] <= 0.5001 * truth["half_gap"], seed
+
+
 def check(name, seed, machine, run):
     """A concealed effect is finite, moves the axis, explains the force and has its size."""
     hidden = run.hidden[name]

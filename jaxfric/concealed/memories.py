@@ -160,21 +160,39 @@ GAIN: Kind = Kind(
 # A second body
 
 
+_LOAD_SHARE, _LOAD_FRICTION_SHARE = (0.3, 0.6), (0.3, 0.8)
+
+
 def _draw_gap(rng, n, size):
-    truth = {"load_share": rng.uniform(0.3, 0.6), "load_friction_share": rng.uniform(0.3, 0.8)}
+    truth = {
+        "load_share": rng.uniform(*_LOAD_SHARE),
+        "load_friction_share": rng.uniform(*_LOAD_FRICTION_SHARE),
+    }
     truth["contact_rate"] = rng.uniform(6, 12) * n.bandwidth
     truth["backlash_force"] = truth["load_friction_share"] * n.coulomb
     return solved(BACKLASH, truth, n, size)
 
 
-def _flanks(truth, n):
-    """Flanks that give way by half the half-gap, as far as a substep resolves what stiff ones do.
+# Of the highest rate at which flanks may swing, per substep.
+_RESOLVED = 0.25
+
+
+def _gap_bounds(n):
+    """Gaps whose flanks a substep resolves though they give way by half the half-gap only.
 
     Where they give way by more than the gap, a compliance is what shows.
     """
+    share = _LOAD_SHARE[0] * (1 - _LOAD_SHARE[0])
+    stiffest = share * n.mass * (_RESOLVED / n.substep) ** 2
+    narrowest = max(2 * _LOAD_FRICTION_SHARE[1] * n.coulomb / stiffest, 1e-5 * n.plan.stroke)
+    return narrowest, max(0.02 * n.plan.stroke, 2 * narrowest)
+
+
+def _flanks(truth, n):
+    """Flanks that give way by half the half-gap at most."""
     reduced = _reduced(truth, n.mass)
     stiff = np.sqrt(2 * truth["backlash_force"] / (truth["half_gap"] * reduced))
-    rate = min(max(truth["contact_rate"], stiff), 0.25 / n.substep)
+    rate = min(max(truth["contact_rate"], stiff), _RESOLVED / n.substep)
     windup = truth["backlash_force"] / (reduced * rate**2)
     return truth | {"contact_rate": float(rate), "windup": float(windup)}
 
@@ -210,7 +228,7 @@ BACKLASH: Kind = Kind(
     ),
     lambda truth: f"within {2 * truth['half_gap']:.3g} after a reversal",
     tuned="half_gap",
-    bounds=lambda n: (1e-5 * n.plan.stroke, 0.02 * n.plan.stroke),
+    bounds=_gap_bounds,
     complete=_flanks,
     impacts=True,
 )
