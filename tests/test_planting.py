@@ -148,6 +148,16 @@ def test_an_own_finding_under_another_name_is_not_counted():
     assert named(said(renamed, finding("frictional_lag")), own, "spring") == ["end_stop"]
 
 
+def test_a_finding_that_takes_in_an_own_one_and_is_declared_confusable_with_the_planted_counts():
+    own = said(finding("end_stop"), where=[("position", 2.0, 1.0)])  # 4 N²
+    both = finding("gravity_unbalance", "spring", "end_stop")
+    now = said(both, where=[("position", 4.0, 1.0)])  # 16 N², 8 of them the finding's
+    assert named(now, own, "spring") == ["gravity_unbalance"]
+    assert named(now, own, "cogging") == []
+    small = {**both, "share": 0.3}
+    assert named(said(small, where=now["where"]), own, "spring") == []
+
+
 def test_a_place_counts_where_structure_has_grown():
     own = said(where=[("position", 2.0, 1.0)])  # 4 N² in all
     now = said(where=[("position", 2.5, 0.5), ("time", 0.1, 0.0)])  # 12.5 N²

@@ -48,10 +48,10 @@ def difference(
     Findings: those of the same effect at the same place are its own, unless this effect was planted
     and its part has grown by half of what the baseline's residual has, in power; so are those that
     are declared confusable with one of its own that is not named again, unless they are what was
-    planted. Where: a place counts if it was not there, or if its structure has grown by half of
-    what the residual has. Held-out error: that before is freed of what its own findings remove, in
-    squares; the oracle, who knows the planted force, is left with what the recording's own model
-    leaves.
+    planted, or as large as half of that growth and declared confusable with what was planted too.
+    Where: a place counts if it was not there, or if its structure has grown by half of what the
+    residual has. Held-out error: that before is freed of what its own findings remove, in squares;
+    the oracle, who knows the planted force, is left with what the recording's own model leaves.
     """
     first, now = _power(own["where"]), _power(answer["where"])
     half = 0.5 * max(now - first, 0.0)
@@ -61,7 +61,10 @@ def difference(
         return finding["effect"] in effects and more > half > 0
 
     def renamed(finding) -> bool:
-        return finding["effect"] not in effects and bool(gone & {*finding["confusable_with"]})
+        alike = {*finding["confusable_with"]}
+        large = (finding["share"] or 0.0) * now > half > 0
+        meant = finding["effect"] in effects or (large and bool(alike & {*effects}))
+        return not meant and bool(gone & alike)
 
     gone = {known["effect"] for known in own["findings"]}
     gone -= {finding["effect"] for finding in answer["findings"]}
