@@ -155,7 +155,7 @@ def test_a_finding_that_takes_in_an_own_one_and_is_declared_confusable_with_the_
     assert named(now, own, "spring") == ["gravity_unbalance"]
     assert named(now, own, "cogging") == []
     small = {**both, "share": 0.3}
-    assert named(said(small, where=now["where"]), own, "spring") == []
+    assert named({**now, "findings": [small]}, own, "spring") == []
 
 
 def test_a_place_counts_where_structure_has_grown():
