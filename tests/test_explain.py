@@ -390,6 +390,17 @@ def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
     assert least("transport_delay", "spring", left=0.004) == 0.05
 
 
+def test_the_moments_of_pushes_have_their_price():
+    def trial(term, beta):
+        candidate = candidates.Candidate(EFFECTS["cogging"], term, np.zeros((1, len(beta))))
+        return contest.Trial(candidate, np.asarray(beta), 0.5, 0.0, 3, 0.002, 0.1, 1.0)
+
+    size, price = 1000.0, 0.5 * np.log(1000.0)
+    pushes = trial(terms.DisturbancePulses((1.0, 2.0, 3.0), 0.1), []).score(0.5, size)
+    wave = trial(terms.Cogging(), [0.01]).score(0.5, size)
+    assert wave - pushes == pytest.approx(3 * price)
+
+
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     asked = question.ask(healthy[0], None, models.named("gaussian"))
     floor = regression.fast(asked.base)

@@ -39,8 +39,13 @@ class Trial(NamedTuple):
     fresh: float
 
     def score(self, gain: float, size: float) -> float:
-        """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978)."""
-        price = self.dimension + len(self.beta)
+        """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978).
+
+        The moments of pushes, and their width, were looked for like any other parameter.
+        """
+        term = self.candidate.term
+        pushes = isinstance(term, DisturbancePulses)
+        price = self.dimension + (len(term.times) + 1 if pushes else len(self.beta))
         return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
 
 
