@@ -44,8 +44,9 @@ class Trial(NamedTuple):
         The moments of pushes, and their width, were looked for like any other parameter.
         """
         term = self.candidate.term
-        pushes = isinstance(term, DisturbancePulses)
-        price = self.dimension + (len(term.times) + 1 if pushes else len(self.beta))
+        price = self.dimension + len(self.beta)
+        if isinstance(term, DisturbancePulses):
+            price += len(term.times) + 1
         return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
 
 
