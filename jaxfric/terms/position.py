@@ -140,14 +140,15 @@ class HardeningSpring(AbstractLaw):
 
 
 def _upper(scales):
-    """Above the middle: what presses over more than half of the stroke is a spring, and no stop;
-    but for the outermost 2 %, where fewer samples than a fit needs would touch it.
+    """In the upper half of the stroke: what presses over more of it is a spring, and no stop.
+
+    Not in the outermost 2 %, where fewer samples than a fit needs would touch it.
     """
     return scales.high - 0.5 * _stroke(scales), scales.high - 0.02 * _stroke(scales)
 
 
 def _lower(scales):
-    """Below the middle, likewise."""
+    """In the lower half of the stroke, likewise."""
     return scales.low + 0.02 * _stroke(scales), scales.low + 0.5 * _stroke(scales)
 
 
