@@ -140,6 +140,14 @@ def test_what_was_there_before_is_not_counted():
     assert named(said(again, other), own, "cogging") == ["cogging"]
 
 
+def test_a_machine_has_one_stop_at_each_end():
+    own = said(finding("end_stop", lower_stop_position=(0.11, 0.01)))
+    below = finding("end_stop", lower_stop_position=(0.07, 0.01))
+    above = finding("end_stop", stop_position=(0.2, 0.01))
+    assert named(said(below), own, "cogging") == []
+    assert named(said(above), own, "cogging") == ["end_stop"]
+
+
 def test_an_own_finding_under_another_name_is_not_counted():
     own = said(finding("frictional_lag"))
     renamed = finding("end_stop", "frictional_lag")

@@ -11,7 +11,9 @@ from .trials import ANSWERS, SEALED, UNREPEATED, failed, path, read
 
 # Parameters that say where a finding is: two with others are two findings.
 PLACES = ("pitch", "unbalance_period", "friction_period", "inertia_period", "frequency",
-          "spot_position", "stop_position", "lower_stop_position", "step_time")  # fmt: skip
+          "spot_position", "step_time")  # fmt: skip
+# A machine has one stop at each end, wherever it is said to begin.
+ENDS = ("stop_position", "lower_stop_position")
 # Places that differ by less, or by less than twice their standard error, are the same place.
 SAME = 0.02
 
@@ -94,6 +96,8 @@ def _power(where: Sequence[Mapping[str, Any]]) -> float:
 def same(finding: Mapping[str, Any], known: Mapping[str, Any]) -> bool:
     """Whether two findings are of one effect, at one place where the effect has one."""
     if finding["effect"] != known["effect"]:
+        return False
+    if any((name in finding["parameters"]) != (name in known["parameters"]) for name in ENDS):
         return False
     for name in PLACES:
         if name in finding["parameters"] and name in known["parameters"]:
