@@ -38,10 +38,9 @@ fitted, each direction of motion with its own parameters.
   that `identify` finds in it.
 - A real machine has findings of its own, with nothing planted: they are in the table above. Every
   answer is judged by its difference to that one. A finding that was there before (the same effect,
-  and the same place where it has one, within 2 % or two standard errors; of a stop, the same end) is
-  not counted, nor is one
-  that is declared confusable with an own one that is not named again, unless it is the planted one
-  or, at half of the growth, declared confusable with it;
+  and the same place where it has one, within 2 % or two standard errors; of a stop, the same end)
+  is not counted, nor is one that is declared confusable with an own one that is not named again,
+  unless it is the planted one or, at half of the growth, declared confusable with it;
   what else is new and was not planted is false. What was planted where the machine has the same of
   its own counts as found if that has grown by half of what the baseline's residual has, in power.
   So does a place that has structure of its own.
