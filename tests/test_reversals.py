@@ -79,6 +79,14 @@ def test_the_mirror_of_a_recording_says_the_same():
         assert yields(mirrored) == yields(recording)
 
 
+def test_one_or_two_large_slopes_say_nothing_about_the_others():
+    draw = np.random.default_rng(1)
+    rest = 1e-10 * np.array([-1.0, -0.05, -0.03, 0.15, 0.4, 2.0, 3.0, 3.0, 4.0, 4.0, 5.0])
+    assert reversals._one_way(np.concatenate([[0.4, 1.0], 1.0 + 0.1 * draw.normal(size=11)]))
+    assert not reversals._one_way(np.concatenate([[0.4, 1.0], rest]))
+    assert not reversals._one_way(draw.normal(size=13))
+
+
 def test_without_a_position_nothing_is_said():
     recording = yielding()
     seen = evidence.gather(question.from_position(recording))

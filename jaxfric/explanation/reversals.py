@@ -39,12 +39,18 @@ def yields(recording: Recording, evidence: Evidence, base: Fit) -> bool:
     slopes = np.array(
         [_slope(level, position[at]) for at, level in passages(recording, evidence, base)]
     )
-    if not len(slopes):
-        return False
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(DRAWS, len(slopes)))
+    return bool(len(slopes)) and _one_way(slopes)
+
+
+def _one_way(slopes: np.ndarray) -> bool:
+    """Whether slopes are positive by more than chance, as they are and by their signs alone.
+
+    Of slopes that are rest and rounding but for one or two, those decide whatever the others do.
+    """
+    draws = np.random.default_rng(0).choice([-1.0, 1.0], size=(DRAWS, len(slopes)))
     # Asked up to three times of a recording, and rows opened by mistake spoil all that follows: so
     # no draw at all may be as large, one chance in DRAWS each.
-    return bool(np.max(signs @ slopes) < np.sum(slopes))
+    return all(np.max(draws @ values) < np.sum(values) for values in (slopes, np.sign(slopes)))
 
 
 def passages(
