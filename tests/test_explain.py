@@ -108,13 +108,8 @@ def test_nothing_is_missing_where_nothing_is(healthy):
     assert 0 < sizes["cogging"] < 0.1 * COULOMB
 
 
-@pytest.mark.parametrize(
-    "effect",
-    [
-        "cogging",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in CASES if name != "cogging"),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", CASES)
 def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
     term, alpha, beta = CASES[effect]
     run, held = (planted(r, term, alpha, beta) for r in healthy)

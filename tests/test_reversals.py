@@ -95,6 +95,7 @@ def test_without_a_position_nothing_is_said():
     assert yields(recording, seen) and not yields(bare, seen)
 
 
+@pytest.mark.slow
 def test_presliding_of_a_few_counts_is_named_with_its_distance():
     found = explain(yielding(), "symmetric-coulomb-viscous", yielding(seed=1))
     assert found.findings[0].effect == "presliding"
