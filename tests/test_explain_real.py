@@ -51,11 +51,15 @@ def test_odrive_cogging_agrees_with_the_map_measured_at_rest(data_folder, run):
 
 
 def test_a_servo_motor_cogs_with_its_pole_pairs(data_folder):
-    """Five times a revolution; the drive's late torque shows it as two lines beside that one."""
+    """Five times a revolution. More is left, and said to be: pushes at nine moments, which would
+    take it down to two thirds of the error, cost more parameters than the evidence carries.
+    """
     folder = data_folder / "delta_servo"
     run, held = (read(folder / f"S1_{i}.csv") for i in (1, 2))
     found = explain(run, "coulomb-viscous", held)
     lines = [f.parameters["pitch"].value for f in found.findings if f.effect == "cogging"]
     assert any(float(pitch) == pytest.approx(2 * math.pi / 5, rel=0.015) for pitch in lines)
     errors = found.fit["holdout_force_error"]
-    assert errors["after"] < 0.7 * errors["before"]
+    assert errors["after"] < 0.87 * errors["before"]
+    assert found.verdict == "partly_explained"
+    assert "disturbance_pulses" not in {f.effect for f in found.findings}

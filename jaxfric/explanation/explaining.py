@@ -17,7 +17,7 @@ from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import OF_BASE, Named, search
+from .naming import LEAST_OF_BASE, Named, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .regression import Fit
@@ -182,10 +182,9 @@ def _verified(found: Named, asked: Question, seed) -> Named:
     return found
 
 
-# On the held-out recording a later term has to take a fifth of the part of the baseline's mismatch
-# that it has to take here, since another motion excites another effect more; or a quarter of what
-# the others leave there, with nothing refitted: what another law leaves does not repeat so well.
-OF_BASE_THERE = 0.2 * OF_BASE
+# On the held-out recording a later term has to take the least part of the baseline's mismatch that
+# it may take here, since another motion excites another effect more; or a quarter of what the
+# others leave there, with nothing refitted: what another law leaves does not repeat so well.
 GOOD_PART = 0.25
 
 
@@ -199,4 +198,4 @@ def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -
     def part(first: Fit) -> float:
         return verification.share(less, found.last, first, asked.held, rephased)
 
-    return part(found.base) >= OF_BASE_THERE or part(less) >= GOOD_PART
+    return part(found.base) >= LEAST_OF_BASE or part(less) >= GOOD_PART

@@ -174,7 +174,8 @@ RAREST = 1.5 / (1 + DRAWS)
 # What comes after stronger terms must also be this part of what the base left, or most of what
 # they leave: no term has quite the shape of what it stands for, and a tenth of its amplitude may
 # stay. No law has the shape of that remainder either, so that it takes the smaller part of it.
-OF_BASE = 0.01
+# Below a twentieth of the amplitude the best of shapes leaves something that a law may follow.
+OF_BASE, LEAST_OF_BASE = 0.01, 0.002
 MOST = 0.5
 # Isolated pushes besides another effect are mostly where that effect switches, and terms on the
 # force's own derivatives take what a strong effect leaves through the kernel.
@@ -222,7 +223,7 @@ def least_gain(effect: Effect, before: Sequence[Effect], base: float, left: floa
         return REVERSAL_OF_BASE * base
     if effect.name in EASY:
         return EASY_OF_BASE * base
-    return min(OF_BASE * base, MOST * left)
+    return max(LEAST_OF_BASE * base, min(OF_BASE * base, MOST * left))
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:
@@ -253,9 +254,9 @@ def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float
 
 
 def _pruned(evidence, now, taken, size):
-    """Without the earlier terms that the newest one has made idle."""
+    """Without terms that the newest one, or the base refitted beside it, has made idle."""
     start = len(now.terms) - len(taken)
-    for place in reversed(range(start, len(now.terms) - 1)):
+    for place in reversed(range(start, len(now.terms))):
         less = without(now, evidence, place)
         gain = 1 - now.energy / less.energy
         if taken[place - start].trial.score(gain, size) <= 0 or gain < LEAST_SHARE:
