@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from . import terms as laws
-from .terms.base import AbstractTerm, Scales
+from .terms.base import AbstractTerm
+from .terms.sample import Scales
 
 # A step in friction cannot be dated better than to about one kernel of the weak form, some
 # thousandths of the record.

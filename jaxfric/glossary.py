@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .effects import EFFECTS, Effect, effect
-from .terms.base import AbstractTerm, Parameter, Scales
+from .terms.base import AbstractTerm
+from .terms.sample import Parameter, Scales
 from .units import spell
 
 SCHEMA = "jaxfric.effects/1"

@@ -15,8 +15,9 @@ from .projections import AbstractProjection, Rows, WeakForm
 from .question import ask
 from .recording import Recording
 from .search import search
-from .terms.base import AbstractTerm, Scales, Sum, bounds as term_bounds, summands
+from .terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from .terms.inertia import Inertia
+from .terms.sample import Scales
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.

@@ -15,7 +15,8 @@ from jaxtyping import Array, Float
 
 from .recording import Recording
 from .signals import continuous, kernel, kernel_slope
-from .terms.base import AbstractTerm, Scales
+from .terms.base import AbstractTerm
+from .terms.sample import Scales
 
 # Levels of velocity tried for the ends of a window, between the first and the last velocity of a
 # segment: outside that range windows only get shorter.

@@ -9,7 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from . import programs
 from .recording import Recording
-from .terms.base import Scales
+from .terms.sample import Scales
 
 # Half-widths, in samples, that the choice of the smoothing derivative runs over: steps of about
 # √2, which changes the noise of the derivative by √2³ = 2.8, from the central difference up.

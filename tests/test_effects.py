@@ -16,7 +16,8 @@ from jaxfric.projections import WeakForm
 from jaxfric.recording import Recording, stack
 from jaxfric.simulation import simulate
 from jaxfric.terms import transmission
-from jaxfric.terms.base import Scales, bounds
+from jaxfric.terms.base import bounds
+from jaxfric.terms.sample import Scales
 from jaxfric.units import Dimension, spell
 
 # Each with nonlinear parameters that suit the axis below, and an amplitude of about a tenth of

@@ -27,7 +27,8 @@ from jaxfric.terms import (
     Sum,
     Viscous,
 )  # fmt: skip
-from jaxfric.terms.base import Scales, bounds, summands
+from jaxfric.terms.base import bounds, summands
+from jaxfric.terms.sample import Scales
 from jaxfric.units import FORCE, VELOCITY
 
 CASES = {

@@ -17,7 +17,8 @@ import numpy as np
 from .. import signals
 from ..recording import Recording, pad
 from ..terms import DryCompliance, ElasticBacklash
-from ..terms.base import AbstractTerm, Scales
+from ..terms.base import AbstractTerm
+from ..terms.sample import Scales
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
 # which is below 1e-4 of its peak.

@@ -11,8 +11,6 @@ from .base import (
     AbstractLaw as AbstractLaw,
     AbstractTerm as AbstractTerm,
     Directional as Directional,
-    Parameter as Parameter,
-    Sample as Sample,
     Sum as Sum,
 )
 from .curvature import (
@@ -49,6 +47,7 @@ from .presliding import (
     FrictionalLag as FrictionalLag,
     LuGre as LuGre,
 )
+from .sample import Parameter as Parameter, Sample as Sample
 from .table import Table as Table
 from .time import (
     AbstractModulated as AbstractModulated,

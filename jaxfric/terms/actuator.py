@@ -12,7 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..units import DIMENSIONLESS, FORCE, TIME
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 from .table import reading
 
 UNKNOWN = float("nan")

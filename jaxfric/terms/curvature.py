@@ -7,7 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY, Dimension
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 from .table import reading
 
 UNKNOWN = float("nan")

@@ -10,7 +10,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 
 UNKNOWN = float("nan")
 

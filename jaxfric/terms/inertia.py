@@ -5,7 +5,8 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from ..units import FORCE, INERTIA
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 
 
 class Inertia(AbstractLaw):

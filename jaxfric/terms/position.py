@@ -12,7 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..units import FORCE, INERTIA, POSITION, STIFFNESS, Dimension
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 
 UNKNOWN = float("nan")
 POSITION_ONLY = frozenset({"position"})

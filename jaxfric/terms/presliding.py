@@ -15,8 +15,9 @@ from jaxtyping import Array, Bool, Float
 
 from ..recording import Recording
 from ..units import FORCE, POSITION, TIME, VELOCITY
-from .base import AbstractTerm, Parameter
+from .base import AbstractTerm
 from .friction import AbstractBump, Gaussian
+from .sample import Parameter
 
 UNKNOWN = float("nan")
 

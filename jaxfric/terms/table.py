@@ -6,7 +6,8 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from ..units import FORCE
-from .base import AbstractLaw, Parameter, Sample
+from .base import AbstractLaw
+from .sample import Parameter, Sample
 
 
 class Table(AbstractLaw):

@@ -9,9 +9,10 @@ from jaxtyping import Array, Float
 
 from ..recording import Recording
 from ..units import FORCE, FREQUENCY, TIME
-from .base import AbstractLaw, AbstractTerm, Parameter, Sample
+from .base import AbstractLaw, AbstractTerm
 from .friction import Coulomb, Viscous
 from .position import wave, waves
+from .sample import Parameter, Sample
 
 UNKNOWN = float("nan")
 

@@ -9,8 +9,8 @@ from jaxtyping import Array, Float
 
 from ..recording import Recording
 from ..units import ACCELERATION, DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
-from .base import Parameter
 from .presliding import AbstractMemory, starts
+from .sample import Parameter
 
 UNKNOWN = float("nan")
 

@@ -1,0 +1,70 @@
+"""What a law sees of a recording: one sample, its magnitudes, and the names of parameters."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..recording import Recording
+from ..units import DIMENSIONLESS, Dimension
+
+
+class Sample(eqx.Module):
+    """One sample of a recording as a law of physics sees it: every field is a scalar.
+
+    `time` s; `position` m; `velocity` m/s; `channels`: further signals by role. In a batch of
+    samples (inside the library) every field has the same leading shape.
+    """
+
+    time: Float[Array, ""]
+    position: Float[Array, ""]
+    velocity: Float[Array, ""]
+    channels: dict[str, Float[Array, ""]] = eqx.field(default_factory=dict)
+
+
+def samples(recording: Recording) -> Sample:
+    """The samples of a recording, each field of shape `(N,)`.
+
+    Without a recorded position the field is NaN, so that a term that needs it fails loudly.
+    """
+    absent = jnp.full_like(recording.time, jnp.nan)
+    position = absent if recording.position is None else recording.position
+    if recording.velocity is None:
+        raise ValueError(
+            "This recording has no velocity yet: pass it through jaxfric.signals.prepare first."
+        )
+    return Sample(recording.time, position, recording.velocity, dict(recording.channels))
+
+
+class Scales(NamedTuple):
+    """What a recording says about magnitudes; the source of every default bound.
+
+    `slowest`: the smallest speed resolved as slip, m/s. `fastest`: the 98 % quantile of the
+    speed, m/s. `low`, `high`: the range of the position, m. `force`: root mean square, N.
+    `start`: the first time stamp, s. `duration`: s. `interval`: the typical sampling interval, s.
+    All scalars.
+    """
+
+    slowest: Float[Array, ""]
+    fastest: Float[Array, ""]
+    low: Float[Array, ""]
+    high: Float[Array, ""]
+    force: Float[Array, ""]
+    start: Float[Array, ""]
+    duration: Float[Array, ""]
+    interval: Float[Array, ""]
+
+
+class Parameter(NamedTuple):
+    """A parameter's name, dimension and, where it is searched for, its compact set.
+
+    `bounds` maps the [`Scales`][] of a recording to `(lower, upper)`, the set B of Kim, Kim & Ha
+    (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio.
+    """
+
+    name: str
+    dimension: Dimension = DIMENSIONLESS
+    bounds: Callable[[Scales], tuple[Array, Array]] | None = None
+    logarithmic: bool = True
