@@ -26,6 +26,7 @@ from jaxfric.explanation import (
     question,
     regression,
     telling,
+    timing,
 )
 from jaxfric.explanation.sentences import sentence
 from jaxfric.uncertainty import Estimate
@@ -210,6 +211,31 @@ def test_a_late_force_is_a_delay_and_nothing_else(healthy):
     delay = found.findings[0].parameters["delay"]
     # The force was aligned within a sample before.
     assert float(delay.value) == pytest.approx(6e-3, abs=1.1e-3)
+
+
+def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
+    gaussian = models.named("gaussian")
+
+    def overlooked(run):
+        asked = question.ask(run, None, gaussian)
+        nothing = naming.Named(asked.base, asked.base, [], contest.Contest([], [], 200.0))
+        return timing.overlooked(run, asked, nothing)
+
+    run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -30))
+    lateness = overlooked(jax.tree.map(lambda x: x[:-32], run))
+    assert lateness.taken.trial.candidate.effect.name == "transport_delay"
+    assert lateness.taken.rivals == () and lateness.taken.p_value <= contest.LEVEL
+    assert lateness.time == pytest.approx(30e-3, abs=1.1e-3)  # within a sample, as above
+    assert overlooked(healthy[0]) is None
+    term, alpha, beta = CASES["cogging"]
+    assert overlooked(planted(healthy[0], term, alpha, beta)) is None
+
+
+def test_blocks_that_disagree_are_chance():
+    block = np.repeat(np.arange(20), 5)
+    one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)
+    assert timing._chance(np.stack([either, one_way]), block, 0) == pytest.approx(0.002)
+    assert timing._chance(either[None], block, 0) > 0.1
 
 
 def test_what_the_motion_has_is_no_tone(healthy):

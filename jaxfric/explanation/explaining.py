@@ -21,8 +21,8 @@ from .naming import LEAST_OF_BASE, Named, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .regression import Fit
-from .telling import tell
-from .timing import late, settled
+from .telling import far_off, tell
+from .timing import late, overlooked, settled
 
 
 def explain(
@@ -71,14 +71,7 @@ def _double(tree, dtype=float):
 def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: int) -> Explanation:
     known = _known(baseline, seed)
     asked, found = _proved(recording, holdout, known.structure, seed)
-    rest = asked, found
-    lateness = late(recording, asked, found)
-    if lateness is not None:
-        # To first order a delay is a column; what it leaves of second order would be named too.
-        later = None if holdout is None else lateness.undone(holdout)
-        there, behind = _proved(lateness.undone(recording), later, known.structure, seed, asked)
-        found, behind = settled(found, behind, lateness, asked, there)
-        rest = there, behind
+    found, rest = _with_the_force_put_back(recording, holdout, known.structure, asked, found, seed)
     wrong = None
     if known.model is not None:
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)
@@ -90,6 +83,33 @@ def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: in
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
     return explanation
+
+
+def _with_the_force_put_back(
+    recording, holdout, structure, asked: Question, found: Named, seed
+) -> tuple[Named, tuple[Question, Named]]:
+    """The findings, and the question where what they leave is judged, with the findings there.
+
+    To first order a delay is a column; what it leaves of second order would be named too. So where
+    the force acts late it is put back, and the search is done once more.
+    """
+    lateness = late(recording, asked, found)
+    sure = lateness is not None
+    if not sure and far_off(asked, found, found.base):
+        lateness = overlooked(recording, asked, found, seed)
+    if lateness is None:
+        return found, (asked, found)
+    later = None if holdout is None else lateness.undone(holdout)
+    there, behind = _proved(lateness.undone(recording), later, structure, seed, asked)
+    both, behind = settled(found, behind, lateness, asked, there)
+    if not sure and later is not None:
+        errors = (
+            verification.error(behind.last, there.held),
+            verification.error(found.last, asked.held, found.rephased),
+        )
+        if errors[0] >= errors[1]:
+            return found, (asked, found)
+    return both, (there, behind)
 
 
 def _known(baseline, seed: int) -> Baseline:

@@ -45,7 +45,6 @@ def _crossing(force: np.ndarray, command: np.ndarray) -> np.ndarray:
 
 def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
     """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`."""
-    time = evidence.elapsed
     spacing = evidence.reach / NODES
     tau = np.arange(-NODES, NODES + 1) / NODES
     weight = 8 * tau * (1 - tau**2) ** 3
@@ -57,5 +56,4 @@ def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
     whole = (before == segment) & (after == segment)
     whole[:NODES] = whole[-NODES:] = False
     near = np.gradient(values, spacing)
-    del time
     return np.where(whole, out, near)

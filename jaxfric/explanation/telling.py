@@ -61,7 +61,7 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     return Explanation(
-        verdict=_verdict(findings, before, after, _rough(*rest, found.base), standing),
+        verdict=_verdict(findings, before, after, far_off(*rest, found.base), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(asked, first, *rest),
@@ -130,7 +130,7 @@ ROUGH = 4.0
 HALF_ROUGH = 1.5
 
 
-def _rough(asked: Question, found: Named, base: Fit) -> bool:
+def far_off(asked: Question, found: Named, base: Fit) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or most of it all."""
     error = verification.error(found.last, asked.evidence)
     floor = verification.noise(found.last, asked.evidence.target)
@@ -157,7 +157,6 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
 
 
 def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Finding]:
-    seen = with_predictions(asked.evidence, found.last)
     start = len(found.last.terms) - len(found.taken)
     values = _estimates(found, asked, rest, units)[start:]
     findings = []
@@ -165,11 +164,7 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
         effect = taken.trial.candidate.effect
         if "step_time" in parameters:
             parameters = _dated(parameters, asked.evidence)
-        less = verification.lacking(found, seen, number)
-        share = (less.energy - found.last.energy) / first.energy
-        held = None
-        if asked.held is not None and effect.name not in OF_THE_MOMENT:
-            held = verification.share(less, found.last, first, asked.held, found.rephased)
+        share, held = _shares(found, asked, rest, first, number)
         rivals = taken.rivals
         text = sentence(effect.name, parameters, share, rivals)
         if taken.rephased:
@@ -185,12 +180,31 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
                 rivals,
                 effect.separate_by,
                 parameters,
-                float(share),
+                share,
                 held,
                 taken.p_value,
-            )  # fmt: skip
+            )
         )
     return sorted(findings, key=lambda finding: -finding.share)
+
+
+def _shares(found: Named, asked: Question, rest, first: Fit, number: int):
+    """The part of the mismatch that a finding alone accounts for, here and held out.
+
+    `None` for what no other recording can say. Of a force that acts late all that undoing it takes
+    away is its own; the others are judged with the force put back.
+    """
+    where, left = rest
+    late = number == len(left.taken)
+    place, named = (asked, found) if late else rest
+    less = verification.lacking(named, with_predictions(place.evidence, named.last), number)
+    # No more than the base leaves, which refitting in a few steps may miss.
+    share = float((min(less.energy, named.base.energy) - left.last.energy) / first.energy)
+    if asked.held is None or found.taken[number].trial.candidate.effect.name in OF_THE_MOMENT:
+        return share, None
+    without, with_it = verification.both(less, left.last, (place.held, where.held), left.rephased)
+    power = np.sum(verification.residual(first, asked.held) ** 2)
+    return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
 
 
 def _estimates(found: Named, asked: Question, rest, units) -> list[dict[str, Estimate]]:

@@ -2,7 +2,8 @@
 
 A column T dû/dt cannot tell u = f(t + τ) from u = f + T df/dt. But the recorded force can be put
 back: taken τ earlier, or passed through the lag 1/(1 + T s). The one that leaves less is the
-better account, by how much noise of the force each of them would leave on its own.
+better account, by how much noise of the force each of them would leave on its own. A time as long
+as the kernel is wide shows in no column; undoing it does.
 """
 
 import dataclasses
@@ -16,12 +17,15 @@ from .. import terms as laws
 from ..effects import EFFECTS
 from ..recording import Recording
 from .candidates import Candidate
-from .contest import RIVAL
+from .chance import BLOCKS, DRAWS, LEVEL
+from .contest import RIVAL, Trial
 from .evidence import gather
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .question import Question, from_position
-from .regression import fit, without
+from .regression import Fit, fit, without
+
+Undo = Callable[[Recording, float], Recording]
 
 LATE = (laws.TransportDelay, laws.ActuatorLag)
 # Times tried, in parts of the first-order estimate, which errs by its own second order.
@@ -29,15 +33,14 @@ TRIED = np.geomspace(0.6, 1.7, 9)
 
 
 class Late(NamedTuple):
-    """A force that acts late: the effect's name, its time, s, and how to undo it.
+    """A force that acts late: its time, s, and how to undo it.
 
-    `place`: of its term in the fit; `taken`: what was found, under its right name; `smoothed`:
-    what the kernel's smoothing and the sampling make of the time, s.
+    `taken`: what was found, under its right name; `smoothed`: what the kernel's smoothing and the
+    sampling make of the time, s.
     """
 
     time: float
-    undo: Callable[[Recording, float], Recording]
-    place: int
+    undo: Undo
     taken: Taken
     smoothed: float
 
@@ -56,28 +59,106 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
     guess = float(found.last.alphas[place][0])
     if guess <= 0:
         return None
-    motion = from_position(recording)
-    ways = {"transport_delay": _earlier, "actuator_lag": _lagged}
-    width = asked.evidence.width
-    least = {
-        name: _least(undo, motion, asked, found, place, guess, width) for name, undo in ways.items()
-    }
-    size = found.left.size
+    undoing = _Undoing(recording, asked, found.last)
+    return _told_apart(undoing, guess, found.taken[place - start], found.left.size)
+
+
+# Undoing a delay or lag that is there takes most of what is left; what merely resembles one, as the
+# bend of a force at its switches does, shares with many others.
+MOST_LATE = 0.5
+
+
+def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 0) -> Late | None:
+    """A delay or lag beside the findings that is too long for its first order to show.
+
+    Times are doubled from one sampling period on until undoing them does more harm than good. What
+    is found is judged by the blocks, with random signs of what it changes in each of them.
+    """
+    if any(isinstance(term, LATE) for term in found.last.terms):
+        return None
+    undoing = _Undoing(recording, asked, found.last)
+    before = undoing.rest(lambda motion, _: motion, 0.0)
+    power, limits = before @ before, asked.evidence.limits
+    times, rests = [], []
+    for undo in WAYS.values():
+        time = limits.interval
+        while time < limits.duration / BLOCKS:
+            times.append(time)
+            rests.append(undoing.rest(undo, time))
+            if rests[-1] @ rests[-1] > power:
+                break
+            time *= 2
+    energies = [rest @ rest for rest in rests]
+    best = int(np.argmin(energies))
+    p_value = _chance(np.stack([before**2 - rest**2 for rest in rests]), asked.block, seed)
+    if energies[best] > (1 - MOST_LATE) * power or p_value > LEVEL:
+        return None
+    candidate = Candidate(EFFECTS["actuator_lag"], laws.ActuatorLag(), np.zeros((1, 0)))
+    gain = float(1 - energies[best] / power)
+    trial = Trial(candidate, np.zeros(0), gain, 0.0, 1, p_value, np.inf, 1.0)
+    return _told_apart(undoing, times[best], Taken(trial, (), p_value), found.left.size)
+
+
+def _chance(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
+    """How likely the blocks agree by chance as much as they do on the best of some changes.
+
+    `changes`: what each of several tries takes off the squared residual, `(T, J)`.
+    """
+    count = int(block[-1]) + 1
+    sums = np.stack([np.bincount(block, change, count) for change in changes])
+    sums /= np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, count))
+    drawn = np.max(signs @ sums.T, axis=1)
+    return float((1 + np.sum(drawn >= np.max(sums.sum(axis=1)))) / (1 + DRAWS))
+
+
+class _Undoing:
+    """A recording whose delay or lag is undone, and the terms that then explain it."""
+
+    def __init__(self, recording: Recording, asked: Question, known: Fit):
+        self.motion, self.asked, self.known = from_position(recording), asked, known
+        pairs = zip(known.terms, known.betas, strict=True)
+        self.terms, self.betas = zip(*(p for p in pairs if not isinstance(p[0], LATE)), strict=True)
+        noise = np.random.default_rng(0).normal(size=self.motion.num_samples)
+        self.noise = dataclasses.replace(self.motion, force=jnp.asarray(noise))
+
+    def rest(self, undo: Undo, time: float, width: int | None = None) -> np.ndarray:
+        """What the refitted terms leave once a time is undone, per unit of force noise, `(J,)`."""
+        asked, width = self.asked, width or self.asked.evidence.width
+        view = gather(undo(self.motion, time), width, asked.delay, asked.reversals)
+        now = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
+        hiss = gather(undo(self.noise, time), width, reversals=asked.reversals)
+        return now.residual / float(np.sqrt(np.mean(hiss.target**2)))
+
+    def least(self, undo: Undo, guess: float, width: int | None = None) -> tuple[float, float]:
+        """The least energy over times about a guess, and the time there."""
+        rests = [self.rest(undo, guess * part, width) for part in TRIED]
+        energies = np.array([rest @ rest for rest in rests])
+        i = int(np.clip(np.argmin(energies), 1, len(TRIED) - 2))
+        bend = np.polyfit(np.log(TRIED[i - 1 : i + 2]), np.log(energies[i - 1 : i + 2]), 2)
+        if bend[0] <= 0:
+            return float(np.min(energies)), float(guess * TRIED[np.argmin(energies)])
+        at = np.clip(-bend[1] / (2 * bend[0]), *np.log(TRIED[[i - 1, i + 1]]))
+        return float(np.exp(np.polyval(bend, at))), float(guess * np.exp(at))
+
+
+def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> Late:
+    """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
+    asked = undoing.asked
+    least = {way: undoing.least(undo, guess) for way, undo in WAYS.items()}
     gap = 0.5 * size * np.log(least["actuator_lag"][0] / least["transport_delay"][0])
     best = "transport_delay" if gap > 0 else "actuator_lag"
-    other = ({"transport_delay", "actuator_lag"} - {best}).pop()
-    taken = found.taken[place - start]
-    rivals = tuple(r for r in taken.rivals if r not in ways)
+    rivals = tuple(r for r in taken.rivals if r not in WAYS)
     if abs(gap) < RIVAL:
-        rivals = (other, *rivals)
+        rivals = (*(way for way in WAYS if way != best), *rivals)
     time = least[best][1]
     wide = time
     if asked.wide is not None:
-        wide = _least(ways[best], motion, asked, found, place, time, 2 * width)[1]
+        wide = undoing.least(WAYS[best], time, 2 * asked.evidence.width)[1]
     # Smoothing errs with the square of the width, so a third of what doubling it changes is left
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
     smoothed = float(np.hypot((wide - time) / 3, asked.evidence.limits.interval / np.sqrt(12)))
-    return Late(time, ways[best], place, _renamed(taken, best, rivals), smoothed)
+    return Late(time, WAYS[best], _renamed(taken, best, rivals), smoothed)
 
 
 def _renamed(taken: Taken, name: str, rivals: tuple[str, ...]) -> Taken:
@@ -110,33 +191,14 @@ def settled(
             left, others = less, [t for i, t in enumerate(others) if i != number]
     evidence = with_predictions(asked.evidence, left)
     now = fit((*left.terms, known.term), evidence, [*left.betas, np.zeros(0)], 6)
-    now = now._replace(alphas=(*now.alphas[:-1], np.array([lateness.time])))
+    # To first order the rest is only nearly itself.
+    now = now._replace(
+        alphas=(*left.alphas, np.array([lateness.time])), betas=(*left.betas, np.zeros(0))
+    )
     rest = behind._replace(last=left, taken=others)
     taken = [*others, lateness.taken]
     found = found._replace(last=now, taken=taken, left=behind.left, smoothed=lateness.smoothed)
     return found, rest
-
-
-def _least(undo: Callable, motion, asked, found, place, guess, width) -> tuple[float, float]:
-    """The least energy over the times tried, per unit of force noise, and the time there."""
-    energies = [_energy(undo, motion, asked, found, place, guess * part, width) for part in TRIED]
-    i = int(np.clip(np.argmin(energies), 1, len(TRIED) - 2))
-    bend = np.polyfit(np.log(TRIED[i - 1 : i + 2]), np.log(energies[i - 1 : i + 2]), 2)
-    if bend[0] <= 0:
-        return float(np.min(energies)), float(guess * TRIED[np.argmin(energies)])
-    at = np.clip(-bend[1] / (2 * bend[0]), *np.log(TRIED[[i - 1, i + 1]]))
-    return float(np.exp(np.polyval(bend, at))), float(guess * np.exp(at))
-
-
-def _energy(undo, motion, asked: Question, found: Named, place: int, time, width) -> float:
-    keep = [i for i in range(len(found.last.terms)) if i != place]
-    view = gather(undo(motion, time), width, asked.delay, asked.reversals)
-    terms, betas = [found.last.terms[i] for i in keep], [found.last.betas[i] for i in keep]
-    now = fit(terms, with_predictions(view, found.last), betas, 3)
-    noise = np.random.default_rng(0).normal(size=motion.num_samples)
-    hiss = dataclasses.replace(motion, force=jnp.asarray(noise))
-    hiss = gather(undo(hiss, time), width, reversals=asked.reversals)
-    return now.energy / float(np.mean(hiss.target**2))
 
 
 def _earlier(motion: Recording, delay: float) -> Recording:
@@ -164,3 +226,6 @@ def _lagged(motion: Recording, lag: float) -> Recording:
             state = k * (state - before + slope * lag) + u - slope * lag
         out[i], before = state, u
     return dataclasses.replace(motion, force=jnp.asarray(out))
+
+
+WAYS = {"transport_delay": _earlier, "actuator_lag": _lagged}

@@ -89,7 +89,7 @@ def share(
     less: Fit, more: Fit, base: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
 ) -> float:
     """Part of the base's mean-square residual elsewhere that `more` removes beyond `less`."""
-    left, right = _both(less, more, evidence, rephased)
+    left, right = both(less, more, (evidence, evidence), rephased)
     power = float(np.sum(residual(base, evidence) ** 2))
     return float(np.sum(left**2) - np.sum(right**2)) / power
 
@@ -100,14 +100,19 @@ def helps(less: Fit, more: Fit, evidence: Evidence, rephased: frozenset[int]) ->
     Both residuals are cut off at four of their standard deviations, by the median: isolated events
     of that recording are not what a term is judged by.
     """
-    left, right = _both(less, more, evidence, rephased)
+    left, right = both(less, more, (evidence, evidence), rephased)
     limit = 4 * np.median(np.abs(right)) / 0.6745
     left, right = (np.minimum(np.abs(r), limit) for r in (left, right))
     return bool(np.sum(left**2) > np.sum(right**2))
 
 
-def _both(less: Fit, more: Fit, evidence: Evidence, rephased) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of both; terms of a moment are left out, but for what tells the two apart."""
+def both(
+    less: Fit, more: Fit, views: tuple[Evidence, Evidence], rephased: frozenset[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of two fits, each on its view of another recording, with nothing refitted.
+
+    Terms of a moment are left out, but for what tells the two apart.
+    """
     others = frozenset(
         next(i for i, term in enumerate(less.terms) if term is more.terms[n])
         for n in rephased
@@ -121,8 +126,8 @@ def _both(less: Fit, more: Fit, evidence: Evidence, rephased) -> tuple[np.ndarra
         for now in (less, more)
     ]
     return (
-        residual(less, evidence, others, idle[0]),
-        residual(more, evidence, rephased, idle[1]),
+        residual(less, views[0], others, idle[0]),
+        residual(more, views[1], rephased, idle[1]),
     )
 
 
