@@ -59,14 +59,7 @@ class Model(eqx.Module):
         **Arguments:** `velocity`, m/s, any shape. Sticking (v = 0) is not slip; there the value
         is that of the constant terms.
         """
-        velocity = jnp.asarray(velocity)
-        flat = jnp.ravel(velocity)
-        motion = Recording(time=jnp.zeros_like(flat), force=jnp.zeros_like(flat), velocity=flat)
-        total = jnp.zeros_like(flat)
-        for term, alpha in zip(_summands(self.term), self._alphas(), strict=True):
-            if term.coordinates <= {"velocity"}:
-                total = total + term.columns(motion) @ alpha + term.offset(motion)
-        return jnp.reshape(total, velocity.shape)
+        return _slip_friction(self, jnp.asarray(velocity))
 
     def without(self, prefix: str) -> "Model":
         """The model without the terms that read a signal whose name begins with `prefix`."""
@@ -126,6 +119,17 @@ class Model(eqx.Module):
             parts.append(self.alpha[start : start + len(term.affine)])
             start += len(term.affine)
         return parts
+
+
+@eqx.filter_jit
+def _slip_friction(model: Model, velocity: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    flat = jnp.ravel(velocity)
+    motion = Recording(time=jnp.zeros_like(flat), force=jnp.zeros_like(flat), velocity=flat)
+    total = jnp.zeros_like(flat)
+    for term, alpha in zip(_summands(model.term), model._alphas(), strict=True):
+        if term.coordinates <= {"velocity"}:
+            total = total + term.columns(motion) @ alpha + term.offset(motion)
+    return jnp.reshape(total, velocity.shape)
 
 
 def from_parameters(

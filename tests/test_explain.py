@@ -378,6 +378,23 @@ def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     assert again.field is first.field
 
 
+def test_a_question_that_cannot_be_put_leaves_no_work_behind(healthy, monkeypatch):
+    fields = []
+
+    def field(*arguments):
+        fields.append(candidates.Field(*arguments))
+        return fields[-1]
+
+    def fails(*arguments):
+        raise ValueError("too short")
+
+    monkeypatch.setattr(question, "Field", field)
+    monkeypatch.setattr(question, "_aligned", fails)
+    with pytest.raises(ValueError, match="too short"):
+        question.ask(healthy[0], None, models.named("gaussian"))
+    assert any(columns.cancelled() for columns in fields[0]._kept.values())
+
+
 def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healthy, monkeypatch):
     asked = question.ask(*healthy, models.named("gaussian"))
     assert asked.wide is not None
@@ -409,6 +426,10 @@ def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
     assert least("backlash", "presliding", left=0.004) == 0.25
     assert least("disturbance_pulses", "presliding", left=0.004) == 0.25
     assert least("transport_delay", "spring", left=0.004) == 0.05
+    # Once a delay is undone nothing of its own is left.
+    after = EFFECTS["thermal_drift"], [EFFECTS["actuator_lag"]]
+    assert naming.least_gain(*after, 1.0, 0.002) == 0.002
+    assert naming.least_gain(*after, 1.0, 0.002, 0.0) == 0.001
 
 
 def test_the_moments_of_pushes_have_their_price():

@@ -1,6 +1,7 @@
 """The terms that compete for a residual, with the places of their nonlinear parameters to try."""
 
 import dataclasses
+import functools
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from ..terms.base import AbstractTerm, Directional, summands
 from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
 from .regression import Space
+from .threads import begin
 
 # Points of a grid over one nonlinear parameter, where nothing finer is needed below.
 GRID = 24
@@ -59,19 +61,31 @@ class Lines(NamedTuple):
         """Columns at each frequency or period, `(G, J, 2 harmonics)`."""
         frequency = 1 / parameters if self.inverse else parameters
         value = np.asarray(getattr(evidence.motion, self.coordinate))[evidence.centre]
+        value = value - value.mean()
         rate = np.asarray(evidence.motion.velocity)[evidence.centre]
         rate = rate if self.coordinate == "position" else np.ones_like(rate)
-        frequency = frequency[:, None]
-        parts = []
+        swept = np.abs(2 * np.pi * evidence.reach * rate).astype(np.float32)
+        side = evidence.side.astype(np.float32) if self.sided else np.float32(1)
+        columns = np.empty((len(parameters), 2 * self.harmonics, len(value)), np.float32)
         for n in range(1, self.harmonics + 1):
-            turns = n * frequency * (value - value.mean())[None, :]
-            # Whole turns go first, so that single precision is enough for sine and cosine.
-            angle = (2 * np.pi * (turns - np.round(turns))).astype(np.float32)
-            swept = np.abs(2 * np.pi * n * frequency * (rate * evidence.reach)[None, :])
-            gain = _GAINS[np.minimum(swept * 20 + 0.5, len(_GAINS) - 1).astype(np.int32)]
-            gain = gain * evidence.side[None, :].astype(np.float32) if self.sided else gain
-            parts += [gain * np.sin(angle), gain * np.cos(angle)]
-        return np.stack(parts, axis=2)
+            for some in range(0, len(parameters), _AT_ONCE):
+                waves = n * frequency[some : some + _AT_ONCE, None]
+                angle = _angle(waves * value)
+                at = np.minimum(waves.astype(np.float32) * (20 * swept) + 0.5, len(_GAINS) - 1)
+                gain = _GAINS[at.astype(np.int32)] * side
+                out = columns[some : some + _AT_ONCE, 2 * n - 2 : 2 * n]
+                np.multiply(gain, np.sin(angle), out=out[:, 0])
+                np.multiply(gain, np.cos(angle), out=out[:, 1])
+        return columns.transpose(0, 2, 1)
+
+
+# Waves whose numbers stay in the cache while they are worked on.
+_AT_ONCE = 8
+
+
+def _angle(turns: np.ndarray) -> np.ndarray:
+    """Turns as angles, without whole turns, so that single precision is enough for their sines."""
+    return np.float32(2 * np.pi) * (turns - np.round(turns)).astype(np.float32)
 
 
 def _transform():
@@ -88,13 +102,28 @@ def _transform():
 _GAINS = _transform()
 
 
+# The signals that a fit predicts at the nodes.
+_PREDICTED = frozenset({"predicted_force", "predicted_acceleration"})
+
+
 class Field:
-    """The candidates for one recording, and their columns, kept from round to round."""
+    """The candidates for one recording, and their columns, kept from round to round.
+
+    Those of the motion are computed from the start, while the caller goes on; columns of what a fit
+    predicts belong to a round.
+    """
 
     def __init__(self, evidence: Evidence, base: AbstractTerm):
         self.candidates = candidates(evidence, base)
         self._motion, self._rows, self._reach = evidence.motion, evidence.rows, evidence.reach
-        self._kept: dict[int, np.ndarray] = {}
+        # With all the signals that there will be, since programs are compiled for these.
+        none = np.zeros(evidence.motion.num_samples)
+        seen = evidence.with_channels(**dict.fromkeys(_PREDICTED, none))
+        self._kept = {
+            id(candidate): begin(functools.partial(_columns, seen), candidate)
+            for candidate in self.candidates
+            if not candidate.term.coordinates & _PREDICTED
+        }
 
     def serves(self, evidence: Evidence) -> bool:
         """Whether the columns are those of other evidence too: the same rows of the same motion.
@@ -108,11 +137,17 @@ class Field:
 
     def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
         """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
-        if any(name.startswith("predicted_") for name in candidate.term.coordinates):
-            return scaled(candidate.columns(evidence))
-        if id(candidate) not in self._kept:
-            self._kept[id(candidate)] = scaled(candidate.columns(evidence))
-        return self._kept[id(candidate)]
+        known = self._kept.get(id(candidate))
+        return _columns(evidence, candidate) if known is None else known.result()
+
+    def close(self) -> None:
+        """Begin no more columns."""
+        for columns in self._kept.values():
+            columns.cancel()
+
+
+def _columns(evidence: Evidence, candidate: Candidate) -> np.ndarray:
+    return scaled(candidate.columns(evidence))
 
 
 def _signals(motion: Recording) -> dict[str, Any]:
@@ -225,14 +260,12 @@ def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
         signals.append(np.asarray(motion.position)[rows])
     series = np.stack([signal - signal.mean() for signal in signals])
     series /= np.maximum(np.linalg.norm(series, axis=1), 1e-300)[:, None]
-    free = np.empty(len(tones), bool)
-    for i, tone in enumerate(tones):
-        angle = 2 * np.pi * tone * (time - time[0])
-        wave = np.stack([np.sin(angle), np.cos(angle)])
-        wave -= wave.mean(axis=1, keepdims=True)
-        power = np.sum((series @ wave.T) ** 2, axis=1) * 2 / len(time)
-        free[i] = np.max(power) < OWN
-    return tones[free]
+    power = np.empty(len(tones))
+    for some in range(0, len(tones), _AT_ONCE):
+        angle = _angle(tones[some : some + _AT_ONCE, None] * (time - time[0]))
+        both = (series @ np.stack([np.sin(angle), np.cos(angle)]).transpose(0, 2, 1)) ** 2
+        power[some : some + _AT_ONCE] = np.max(np.sum(both, axis=0), axis=0) * 2 / len(time)
+    return tones[power < OWN]
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.

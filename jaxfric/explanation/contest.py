@@ -10,6 +10,7 @@ from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .pulses import pulses
 from .regression import Fit, fit
+from .threads import each
 
 # A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
 # 1995 call ten on twice this scale very strong).
@@ -86,7 +87,7 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
         scan = judge(raw, candidate.effect.positive)
         return scan, raw[scan.best : scan.best + 1]
 
-    scans, best = zip(*map(scanned, field.candidates), strict=True)
+    scans, best = zip(*each(scanned, field.candidates), strict=True)
     drawn = np.array([s.drawn for s in scans])
     p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
     least = thresholds(drawn, LEVEL)
@@ -120,13 +121,15 @@ def _trial(judge, candidate, own, scan, p_value, limit) -> Trial:
 
 
 def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
-    done, basis = [], now.basis()
+    basis = now.basis()
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     # A sharp term may not be confirmed, and must not keep the next best from being looked at.
     blunt = [t for t in trials if t.candidate.effect.name not in SHARP]
     leader = (blunt or trials)[0]
     enough = 0.5 * leader.score(leader.gain, size) - RIVAL
-    for number, trial in enumerate(trials):
+
+    def final(numbered: tuple[int, Trial]) -> Finalist | None:
+        number, trial = numbered
         found = None
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
             found = _refined(seen, now, trial, basis)
@@ -137,11 +140,13 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
             trial = _overtone(trial, found)
             found = _refined(seen, now, trial, basis)
         if found is None or not _sensible(trial, found.alpha):
-            continue
+            return None
         gain = 1 - found.energy / now.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
-        done.append(found._replace(score=trial.score(gain, size), p_value=p_value))
+        return found._replace(score=trial.score(gain, size), p_value=p_value)
+
+    done = [found for found in each(final, enumerate(trials)) if found is not None]
     return sorted(done, key=lambda finalist: -finalist.score)
 
 

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .. import signals
+from .. import programs, signals
 from ..recording import Recording, pad
 from ..terms import DryCompliance, ElasticBacklash
 from ..terms.base import AbstractTerm
@@ -195,7 +195,7 @@ def lengthened(recording: Recording) -> Recording:
     return signals.prepare(pad(nameless, _length(recording.num_samples)))
 
 
-_scales = eqx.filter_jit(signals.scales)
+_scales = programs.kept(signals.scales)
 
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
 # axis hardly accelerates, the noise of its acceleration would ask for wider ones.

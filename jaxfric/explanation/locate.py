@@ -13,6 +13,7 @@ from .candidates import Lines, line_frequencies, scaled
 from .chance import Judge, Scan, adjusted, blocks
 from .evidence import Evidence
 from .regression import Fit, fit
+from .threads import each
 
 # Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
 KNOTS = 12
@@ -56,8 +57,8 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
         return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
 
     there = {"position": evidence.motion.position is not None, "time": evidence.clock}
-    lines = [along(name) for name, known in there.items() if known]
-    seen = [*map(over, coordinates(evidence).items()), *lines]
+    lines = each(along, [name for name, known in there.items() if known])
+    seen = [*each(over, coordinates(evidence).items()), *lines]
     gains = np.array([s.scan.gain.max() for s in seen])
     p_values = adjusted(gains, np.array([s.scan.drawn for s in seen]))
     found = [_place(s, float(p), now) for s, p in zip(seen, p_values, strict=True)]

@@ -212,18 +212,20 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
     return None
 
 
-def least_gain(effect: Effect, before: Sequence[Effect], base: float, left: float) -> float:
+def least_gain(
+    effect: Effect, before: Sequence[Effect], base: float, left: float, floor: float = LEAST_OF_BASE
+) -> float:
     """The energy that a term after others must account for, N².
 
     **Arguments:** `before`: the effects taken already; `base` and `left`: the energy that the base
-    left, and that they leave.
+    left, and that they leave; `floor`: the least part of the base's.
     """
     again = any(earlier.name in AT_REVERSALS for earlier in before)
     if again and (effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"):
         return REVERSAL_OF_BASE * base
     if effect.name in EASY:
         return EASY_OF_BASE * base
-    return max(LEAST_OF_BASE * base, min(OF_BASE * base, MOST * left))
+    return max(floor * base, min(OF_BASE * base, MOST * left))
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:

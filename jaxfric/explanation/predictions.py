@@ -21,9 +21,9 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
         plain, moving = evaluate(
             term, jnp.asarray(np.repeat(beta[None], PAIR, axis=0)), evidence.motion
         )
-        force = force + alpha @ np.asarray(plain[0])
+        force = force + alpha @ np.asarray(plain)[0]
         if moving is not None:
-            momentum = momentum + alpha @ np.asarray(moving[0])
+            momentum = momentum + alpha @ np.asarray(moving)[0]
     force = force + rate(evidence, momentum)
     if any(isinstance(term, ActuatorDeadband) for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))

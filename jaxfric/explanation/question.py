@@ -52,6 +52,20 @@ def ask(
     """
     motion = from_position(recording)
     evidence = gather(motion)
+    if before is not None:
+        return _aligned(motion, evidence, holdout, structure, known, before.field)
+    field = Field(evidence, structure)
+    try:
+        asked = _aligned(motion, evidence, holdout, structure, known, field)
+    except BaseException:
+        field.close()
+        raise
+    if asked.field is not field:
+        field.close()
+    return asked
+
+
+def _aligned(motion, evidence: Evidence, holdout, structure, known, field: Field) -> Question:
     wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
     known = fit([structure], evidence) if known is None else known
     # To first order a delay is a column; the first estimate is good to a fifth of a sample.
@@ -73,8 +87,7 @@ def ask(
         held = gather(from_position(holdout), evidence.width, delay, across)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    field = None if before is None else before.field
-    if field is None or not field.serves(evidence):
+    if not field.serves(evidence):
         field = Field(evidence, structure)
     return Question(evidence, wide, held, base, block, structure, field, delay, across)
 

@@ -183,10 +183,10 @@ def settled(
     for number in reversed(range(len(others))):
         place = len(left.terms) - len(others) + number
         less = without(left, seen, place)
-        # As for any later term.
+        # As for any later term, but that an undone delay leaves nothing of its own.
         before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
         effect = others[number].trial.candidate.effect
-        least = least_gain(effect, before, found.base.energy, less.energy)
+        least = least_gain(effect, before, found.base.energy, less.energy, 0.0)
         if less.energy - left.energy < least:
             left, others = less, [t for i, t in enumerate(others) if i != number]
     evidence = with_predictions(asked.evidence, left)

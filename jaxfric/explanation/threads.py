@@ -1,0 +1,30 @@
+"""Work beside other work: compiling and arithmetic on arrays leave Python to another thread."""
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+import jax
+
+_Item = TypeVar("_Item")
+_Made = TypeVar("_Made")
+
+# What is waited for goes first come, first served, so that a task may wait for an earlier one. Two
+# threads use both cores of a small machine; of more, Python itself lets only one go on at a time.
+_pool = ThreadPoolExecutor(2, "jaxfric")
+
+
+def begin(function: Callable[[_Item], _Made], item: _Item) -> "Future[_Made]":
+    """Start a call that the caller does not wait for yet."""
+    return _pool.submit(_double, function, item)
+
+
+def each(function: Callable[[_Item], _Made], items: Iterable[_Item]) -> list[_Made]:
+    """A function of each item, of several at once; not from inside such a function."""
+    return [started.result() for started in [begin(function, item) for item in items]]
+
+
+def _double(function: Callable[[_Item], _Made], item: _Item) -> _Made:
+    """A call in double precision, which holds for one thread only."""
+    with jax.enable_x64(True):
+        return function(item)
