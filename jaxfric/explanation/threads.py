@@ -21,7 +21,12 @@ def begin(function: Callable[[_Item], _Made], item: _Item) -> "Future[_Made]":
 
 def each(function: Callable[[_Item], _Made], items: Iterable[_Item]) -> list[_Made]:
     """A function of each item, of several at once; not from inside such a function."""
-    return [started.result() for started in [begin(function, item) for item in items]]
+    started = [begin(function, item) for item in items]
+    try:
+        return [made.result() for made in started]
+    finally:
+        for made in started:
+            made.cancel()  # what has not begun when one fails
 
 
 def _double(function: Callable[[_Item], _Made], item: _Item) -> _Made:
