@@ -231,6 +231,35 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
     assert overlooked(planted(healthy[0], term, alpha, beta)) is None
 
 
+def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
+    run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -10))
+    run = jax.tree.map(lambda x: x[:-12], run)
+    asked = question.ask(run, None, models.named("gaussian"))
+    undoing = timing._Undoing(run, asked, asked.base)
+    delay = timing.WAYS["transport_delay"]
+    found = [undoing.least(delay, guess) for guess in (3e-3, 9.5e-3, 30e-3)]
+    times = [time for _, time in found]
+    np.testing.assert_allclose(times, times[1], rtol=2 * timing.CLOSE)
+    assert times[1] == pytest.approx(10e-3, abs=1.1e-3)
+    assert found[0][0] < 0.5 * undoing.least(timing.WAYS["actuator_lag"], 9.5e-3)[0]
+
+
+def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypatch):
+    now = types.SimpleNamespace(energy=1.0)
+    monkeypatch.setattr(naming, "_alike", lambda finalist, now, view, *_: view == "between")
+
+    def confirmed(term, gain, between="between"):
+        trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
+        load = types.SimpleNamespace(trial=trial, energy=1 - gain)
+        return naming._confirmed(load, now, (between, "wide"), 0.03)
+
+    swinging = terms.Compliance(20.0, 0.2)
+    assert confirmed(swinging, 0.6) and confirmed(LOAD, 0.6)
+    assert not confirmed(swinging, 0.4)
+    assert not confirmed(swinging, 0.6, None)
+    assert not confirmed(terms.FrictionalLag(0.02, terms.Gaussian(0.05)), 0.6)
+
+
 def test_blocks_that_disagree_are_chance():
     block = np.repeat(np.arange(20), 5)
     one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)
@@ -422,7 +451,7 @@ def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
 
     assert least("gain_asymmetry", "spring", left=0.5) == 0.01
     assert least("gain_asymmetry", "spring", left=0.004) == 0.002
-    assert least("backlash", "spring", left=0.004) == 0.002
+    assert least("backlash", "spring", left=0.004) == 0.05
     assert least("backlash", "presliding", left=0.004) == 0.25
     assert least("disturbance_pulses", "presliding", left=0.004) == 0.25
     assert least("transport_delay", "spring", left=0.004) == 0.05

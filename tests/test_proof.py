@@ -156,7 +156,16 @@ def test_parameters_are_compared_where_the_names_coincide():
 
 def test_where_the_oracle_gains_nothing_no_share_is_made_of_it():
     said = answer(finding("cogging"), before=0.1, after=0.05, oracle=0.095)
-    assert scoring.score(case("cogging"), sealed(cogging={}), said).reached is None
+    hidden = scoring.score(case("cogging"), sealed(cogging={}), said)
+    assert hidden.reached is None and not hidden.shows
+
+
+def test_an_effect_shows_where_knowing_it_helps_or_nobody_was_asked():
+    def shows(**errors):
+        return scoring.score(case("cogging"), sealed(cogging={}), answer(**errors)).shows
+
+    assert shows(before=0.1, oracle=0.089) and shows(before=0.1, oracle=None)
+    assert not shows(before=0.1, oracle=0.091)
 
 
 def test_a_case_that_went_wrong_is_a_miss_in_every_rate():

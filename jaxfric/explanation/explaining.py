@@ -21,7 +21,7 @@ from .naming import LEAST_OF_BASE, Named, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask
 from .regression import Fit
-from .telling import far_off, tell
+from .telling import tell
 from .timing import late, overlooked, settled
 
 
@@ -95,8 +95,7 @@ def _with_the_force_put_back(
     """
     lateness = late(recording, asked, found)
     sure = lateness is not None
-    if not sure and far_off(asked, found, found.base):
-        lateness = overlooked(recording, asked, found, seed)
+    lateness = lateness or overlooked(recording, asked, found, seed)
     if lateness is None:
         return found, (asked, found)
     later = None if holdout is None else lateness.undone(holdout)
@@ -123,7 +122,7 @@ def _as_given(known: Baseline, asked: Question, seed) -> tuple[Question, Named]:
     """The search with the baseline's own values, which nothing on the recording contradicts."""
     base = at_values(known.model, asked.evidence)
     asked = asked._replace(base=base)
-    return asked, search(asked.evidence, base, asked.field, asked.wide, seed)
+    return asked, search(asked.evidence, base, asked.field, asked.wider, seed)
 
 
 def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
@@ -138,7 +137,7 @@ def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question,
     refuted = _names(first) - _names(found)
     if not refuted:
         return asked, found
-    again = search(asked.evidence, asked.base, asked.field, asked.wide, seed, refuted)
+    again = search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted)
     _check_signals(again, recording, holdout)
     again = _verified(again, asked, seed)
     errors = [verification.error(each.last, asked.held, each.rephased) for each in (found, again)]
@@ -168,12 +167,12 @@ def _names(found: Named) -> frozenset[str]:
 def pursue(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
     """The question, put again if what was found changes how force and motion are aligned."""
     asked = ask(recording, holdout, structure, before=before)
-    found = search(asked.evidence, asked.base, asked.field, asked.wide, seed)
+    found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
     if found.taken:
         again = ask(recording, holdout, structure, found.last, asked)
         if abs(again.delay - asked.delay) > ALIGNED * asked.evidence.limits.interval:
             asked = again
-            found = search(asked.evidence, asked.base, asked.field, asked.wide, seed)
+            found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
     return asked, found
 
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..catalogue import Effect
-from ..terms import ElasticBacklash
+from ..terms import Compliance, DryCompliance, ElasticBacklash
 from .candidates import Field
 from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
@@ -21,6 +21,10 @@ from .regression import Fit, fast, fit, without
 LEAST_SHARE = 0.03
 LATER_SHARE = 0.05
 MOST_TERMS = 4
+
+
+# Through a kernel a third wider, and twice as wide; `None` where too little would be left.
+Wider = tuple[Evidence | None, Evidence | None]
 
 
 class Taken(NamedTuple):
@@ -60,15 +64,15 @@ def search(
     evidence: Evidence,
     base: Fit,
     field: Field,
-    wide: Evidence | None = None,
+    wider: Wider = (None, None),
     seed: int = 0,
     refuted: frozenset[str] = frozenset(),
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
-    **Arguments:** `field`: the candidates; `wide`: the recording through a kernel of twice the
-    width, where terms that act on derivatives of the force must show alike; `refuted`: effects
-    that are out of question.
+    **Arguments:** `field`: the candidates; `wider`: the recording through wider kernels, where
+    terms that act on derivatives of the force must show alike; `refuted`: effects that are out of
+    question.
     """
     now = base
     taken: list[Taken] = []
@@ -82,7 +86,7 @@ def search(
             if f.trial.candidate.effect.name not in refuted and plausible(f, now, evidence)
         ]
         round_ = round_._replace(finalists=machines)
-        best = _believed(round_, now, evidence, wide, base, taken)
+        best = _believed(round_, now, evidence, wider, base, taken)
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
@@ -178,16 +182,19 @@ RAREST = 1.5 / (1 + DRAWS)
 OF_BASE, LEAST_OF_BASE = 0.01, 0.002
 MOST = 0.5
 # Isolated pushes besides another effect are mostly where that effect switches, and terms on the
-# force's own derivatives take what a strong effect leaves through the kernel.
+# force's own derivatives take what a strong effect leaves through the kernel; a load behind a gap
+# is one of them, with three numbers of its own.
 EASY_OF_BASE = 0.05
-EASY = frozenset({"transport_delay", "actuator_lag", "compliance", "disturbance_pulses"})
+EASY = frozenset(
+    {"transport_delay", "actuator_lag", "compliance", "backlash", "disturbance_pulses"}
+)
 # Each of these is an idealisation of what happens about a reversal (one spring, friction without a
 # dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
 REVERSAL_OF_BASE = 0.25
 
 
-def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[Taken]):
+def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken]):
     least = LATER_SHARE if taken else LEAST_SHARE
     floor = LINEARITY**2 * float(evidence.target @ evidence.target)
     before = [t.trial.candidate.effect for t in taken]
@@ -206,7 +213,7 @@ def _believed(round_: Contest, now: Fit, evidence, wide, base: Fit, taken: list[
         level = RAREST if sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if (sharp or dynamic) and not _confirmed(finalist, now, wide, least):
+        if (sharp or dynamic) and not _confirmed(finalist, now, wider, least):
             continue
         return finalist
     return None
@@ -235,14 +242,29 @@ def _again(finalist: Finalist, taken: list[Taken]) -> bool:
     return not several and any(t.trial.candidate.effect.name == own.effect.name for t in taken)
 
 
-def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float) -> bool:
+def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 
-    There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly: of a column
-    of noise what the rest cannot imitate changes by more than half, of one of physics it does not.
+    There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly. But a load
+    may swing above that kernel's band. What takes most of what is left is not the noise of the
+    encoder to which the controller answers, a quarter of it at most on machines with nothing
+    concealed; then a kernel a third wider will do.
     """
-    if wide is None:
+    between, wide = wider
+    if wide is None or _alike(finalist, now, wide, 2.0, least):
         return True
+    swings = isinstance(finalist.trial.candidate.term, Compliance | DryCompliance)
+    most = now.energy - finalist.energy >= MOST * now.energy
+    loud = swings and most and between is not None
+    return loud and _alike(finalist, now, between, 4 / 3, least)
+
+
+def _alike(finalist: Finalist, now: Fit, wide: Evidence, factor: float, least: float) -> bool:
+    """Whether a term has the same size, within a factor, through a kernel as much wider.
+
+    Of a column of noise what the rest cannot imitate changes by more, of one of physics it does
+    not.
+    """
     less = fit(now.terms, with_predictions(wide, now), now.betas, 4)
     seen = with_predictions(wide, less)
     # At the β of the narrow kernel: where the wide one leaves little, it would find another.
@@ -252,7 +274,8 @@ def _confirmed(finalist: Finalist, now: Fit, wide: Evidence | None, least: float
         float(np.linalg.norm(there.columns @ finalist.alpha)), 1e-300
     )
     positive = bool(np.all(there.alphas[0] > 0))
-    return positive and 0.5 < ratio < 2 and less.energy - there.energy >= least * less.energy
+    enough = less.energy - there.energy >= least * less.energy
+    return positive and 1 / factor < ratio < factor and enough
 
 
 def _pruned(evidence, now, taken, size):

@@ -22,13 +22,15 @@ ALIGNED = 0.1
 class Question(NamedTuple):
     """A recording through a kernel and one of twice the width, its base fit, the held-out one.
 
-    `delay`: how much later the force was taken, s; `block`: of each row; `structure`: the baseline;
-    `field`: the candidates, with their columns; `reversals`: whether rows reach across reversals,
-    where the axis moves instead of sticking.
+    `between`: through a kernel a third wider, where there is one; `delay`: how much later the
+    force was taken, s; `block`: of each row; `structure`: the baseline; `field`: the candidates,
+    with their columns; `reversals`: whether rows reach across reversals, where the axis moves
+    instead of sticking.
     """
 
     evidence: Evidence
     wide: Evidence | None
+    between: Evidence | None
     held: Evidence | None
     base: Fit
     block: np.ndarray
@@ -36,6 +38,11 @@ class Question(NamedTuple):
     field: Field
     delay: float
     reversals: bool = False
+
+    @property
+    def wider(self) -> tuple[Evidence | None, Evidence | None]:
+        """Through a kernel a third wider, and twice as wide."""
+        return self.between, self.wide
 
 
 def ask(
@@ -89,19 +96,22 @@ def _aligned(motion, evidence: Evidence, holdout, structure, known, field: Field
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     if not field.serves(evidence):
         field = Field(evidence, structure)
-    return Question(evidence, wide, held, base, block, structure, field, delay, across)
+    between = _wider(motion, evidence, delay, across, 4 / 3)
+    return Question(evidence, wide, between, held, base, block, structure, field, delay, across)
 
 
-def _wider(recording: Recording, narrow: Evidence, delay=0.0, across=False) -> Evidence | None:
-    """The recording through a kernel of twice the width; `None` if too few rows are left to judge
-    by.
+def _wider(
+    recording: Recording, narrow: Evidence, delay=0.0, across=False, factor=2.0
+) -> Evidence | None:
+    """The recording through a wider kernel; `None` if there is none as narrow, or if too few rows
+    are left to judge by.
     """
     try:
-        wide = gather(recording, 2 * narrow.width, delay, across)
+        wide = gather(recording, round(factor * narrow.width), delay, across)
         blocks(wide.elapsed[wide.centre], wide.reach)
     except ValueError:
         return None
-    return wide
+    return wide if wide.width > narrow.width else None
 
 
 def from_position(recording: Recording) -> Recording:

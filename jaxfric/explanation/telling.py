@@ -61,7 +61,7 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     return Explanation(
-        verdict=_verdict(findings, before, after, far_off(*rest, found.base), standing),
+        verdict=_verdict(findings, before, after, _rough(*rest, found.base), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(asked, first, *rest),
@@ -130,7 +130,7 @@ ROUGH = 4.0
 HALF_ROUGH = 1.5
 
 
-def far_off(asked: Question, found: Named, base: Fit) -> bool:
+def _rough(asked: Question, found: Named, base: Fit) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or most of it all."""
     error = verification.error(found.last, asked.evidence)
     floor = verification.noise(found.last, asked.evidence.target)

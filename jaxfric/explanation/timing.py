@@ -7,6 +7,7 @@ as the kernel is wide shows in no column; undoing it does.
 """
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -28,8 +29,10 @@ from .regression import Fit, fit, without
 Undo = Callable[[Recording, float], Recording]
 
 LATE = (laws.TransportDelay, laws.ActuatorLag)
-# Times tried, in parts of the first-order estimate, which errs by its own second order.
-TRIED = np.geomspace(0.6, 1.7, 9)
+# Steps, from the first-order estimate, which may be off by its own second order, to times between
+# which the least energy lies; and parabolas from there on, until the time is this well known.
+STRIDE, STRIDES = 1.3, 12
+PARABOLAS, CLOSE = 4, 3e-3
 
 
 class Late(NamedTuple):
@@ -71,32 +74,33 @@ MOST_LATE = 0.5
 def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 0) -> Late | None:
     """A delay or lag beside the findings that is too long for its first order to show.
 
-    Times are doubled from one sampling period on until undoing them does more harm than good. What
-    is found is judged by the blocks, with random signs of what it changes in each of them.
+    Times are doubled from one sampling period on until undoing them does more harm than good, which
+    is at once where nothing is late. What is found is judged by the blocks, with random signs of
+    what it changes in each of them, and has to show through a kernel of twice the width too.
     """
     if any(isinstance(term, LATE) for term in found.last.terms):
         return None
     undoing = _Undoing(recording, asked, found.last)
-    before = undoing.rest(lambda motion, _: motion, 0.0)
+    before = undoing.rest(_as_it_is, 0.0)
     power, limits = before @ before, asked.evidence.limits
-    times, rests = [], []
+    tried = []
     for undo in WAYS.values():
         time = limits.interval
         while time < limits.duration / BLOCKS:
-            times.append(time)
-            rests.append(undoing.rest(undo, time))
-            if rests[-1] @ rests[-1] > power:
+            tried.append((undo, time, undoing.rest(undo, time)))
+            if tried[-1][2] @ tried[-1][2] > power:
                 break
             time *= 2
-    energies = [rest @ rest for rest in rests]
-    best = int(np.argmin(energies))
-    p_value = _chance(np.stack([before**2 - rest**2 for rest in rests]), asked.block, seed)
-    if energies[best] > (1 - MOST_LATE) * power or p_value > LEVEL:
+    undo, time, rest = min(tried, key=lambda each: each[2] @ each[2])
+    gain = float(1 - rest @ rest / power)
+    if gain < MOST_LATE or undoing.gain(undo, time, 2 * asked.evidence.width) < MOST_LATE:
+        return None
+    p_value = _chance(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
+    if p_value > LEVEL:
         return None
     candidate = Candidate(EFFECTS["actuator_lag"], laws.ActuatorLag(), np.zeros((1, 0)))
-    gain = float(1 - energies[best] / power)
     trial = Trial(candidate, np.zeros(0), gain, 0.0, 1, p_value, np.inf, 1.0)
-    return _told_apart(undoing, times[best], Taken(trial, (), p_value), found.left.size)
+    return _told_apart(undoing, time, Taken(trial, (), p_value), found.left.size)
 
 
 def _chance(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
@@ -130,16 +134,48 @@ class _Undoing:
         hiss = gather(undo(self.noise, time), width, reversals=asked.reversals)
         return now.residual / float(np.sqrt(np.mean(hiss.target**2)))
 
+    def gain(self, undo: Undo, time: float, width: int) -> float:
+        """The part of the energy that undoing a time takes through a kernel; 0 without rows."""
+        try:
+            before, after = self.rest(_as_it_is, 0.0, width), self.rest(undo, time, width)
+        except ValueError:
+            return 0.0
+        return float(1 - after @ after / (before @ before))
+
     def least(self, undo: Undo, guess: float, width: int | None = None) -> tuple[float, float]:
-        """The least energy over times about a guess, and the time there."""
-        rests = [self.rest(undo, guess * part, width) for part in TRIED]
-        energies = np.array([rest @ rest for rest in rests])
-        i = int(np.clip(np.argmin(energies), 1, len(TRIED) - 2))
-        bend = np.polyfit(np.log(TRIED[i - 1 : i + 2]), np.log(energies[i - 1 : i + 2]), 2)
-        if bend[0] <= 0:
-            return float(np.min(energies)), float(guess * TRIED[np.argmin(energies)])
-        at = np.clip(-bend[1] / (2 * bend[0]), *np.log(TRIED[[i - 1, i + 1]]))
-        return float(np.exp(np.polyval(bend, at))), float(guess * np.exp(at))
+        """The least energy over times, from a guess downhill, and the time there."""
+
+        @functools.cache
+        def energy(time: float) -> float:
+            rest = self.rest(undo, time, width)
+            return float(rest @ rest)
+
+        low, best, high = guess / STRIDE, guess, guess * STRIDE
+        for _ in range(STRIDES):
+            if energy(low) < min(energy(best), energy(high)):
+                low, best, high = low / STRIDE, low, best
+            elif energy(high) < energy(best):
+                low, best, high = best, high, high * STRIDE
+            else:
+                break
+        for _ in range(PARABOLAS):
+            places = np.array([low, best, high])
+            time = _vertex(places, np.array([energy(place) for place in places]))
+            if not low < time < high or abs(time - best) < CLOSE * best:
+                break
+            better = energy(time) < energy(best)
+            if time < best:
+                low, best, high = (low, time, best) if better else (time, best, high)
+            else:
+                low, best, high = (best, time, high) if better else (low, best, time)
+        return energy(best), best
+
+
+def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
+    """Where a parabola through three points is lowest; NaN where it is nowhere."""
+    middle, spread = places[1], places[2] - places[0]
+    square, slope, _ = np.polyfit((places - middle) / spread, heights / heights[1], 2)
+    return float(middle - 0.5 * spread * slope / square) if square > 0 else float("nan")
 
 
 def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> Late:
@@ -226,6 +262,10 @@ def _lagged(motion: Recording, lag: float) -> Recording:
             state = k * (state - before + slope * lag) + u - slope * lag
         out[i], before = state, u
     return dataclasses.replace(motion, force=jnp.asarray(out))
+
+
+def _as_it_is(motion: Recording, _: float) -> Recording:
+    return motion
 
 
 WAYS = {"transport_delay": _earlier, "actuator_lag": _lagged}

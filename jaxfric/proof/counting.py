@@ -114,10 +114,15 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
     }
     for text, low, high in LEVELS:
         some = [s for s in single if s.sizes and low <= s.sizes[0] < high]
+        seen = [s for s in some if s.shows]
         rows |= {
             f"one effect, {text}: named exactly": rate(some, lambda s: s.exact),
             f"one effect, {text}: named or declared confusable": rate(some, lambda s: s.within),
             f"one effect, {text}: its place found": rate(some, located),
+            f"one effect, {text}, that shows: named exactly": rate(seen, lambda s: s.exact),
+            f"one effect, {text}, that shows: named or declared confusable": rate(
+                seen, lambda s: s.within
+            ),
             f"one effect, {text}: parameters' median relative error": middle(
                 p.error for p in parameters(some)
             ),

@@ -74,12 +74,18 @@ class Score(NamedTuple):
     @property
     def reached(self) -> float | None:
         """Part of the oracle's reduction of the held-out error; `None` where that is too small."""
-        if None in (self.before, self.after, self.oracle):
+        if None in (self.before, self.after, self.oracle) or not self.shows:
             return None
-        possible = self.before - self.oracle
-        if possible < LEAST_REDUCTION * self.before:
-            return None
-        return (self.before - self.after) / possible
+        return (self.before - self.after) / (self.before - self.oracle)
+
+    @property
+    def shows(self) -> bool:
+        """Whether knowing the truth lowers the held-out error: else the baseline imitates it, or it
+        is within the noise. Nobody knows of one without an oracle: then it does.
+        """
+        if self.before is None or self.oracle is None:
+            return True
+        return self.before - self.oracle >= LEAST_REDUCTION * self.before
 
     @property
     def hits(self) -> int:

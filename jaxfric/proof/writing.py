@@ -30,7 +30,8 @@ that disturbs. Its answer is written to `answers/`. Scoring opens `sealed/` afte
   nothing refitted; its error is the norm of that residual over the norm of the held-out force as
   measured. *Part of the oracle's reduction*: (before − after)/(before − oracle), of cases where
   the oracle removes {LEAST_REDUCTION:.0%} of the error or more, and not of `disturbance_pulses`,
-  which come at other moments in the held-out recording.
+  which come at other moments in the held-out recording. An effect *shows* where the oracle removes
+  as much, or is not asked: else the baseline imitates its force, or the noise hides it.
 - *Velocity run forward*: the model, driven by the held-out force, is started anew from the
   recorded motion every fifth of the time between reversals; norm of what its velocity is off over
   norm of the velocity. Of cases where something was found and both models can run: not presliding,
