@@ -93,7 +93,8 @@ def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 
             time *= 2
     undo, time, rest = min(tried, key=lambda each: each[2] @ each[2])
     gain = float(1 - rest @ rest / power)
-    if gain < MOST_LATE or undoing.gain(undo, time, 2 * asked.evidence.width) < MOST_LATE:
+    wide = asked.wide
+    if gain < MOST_LATE or (wide and undoing.gain(undo, time, wide.width) < MOST_LATE):
         return None
     p_value = _chance(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
     if p_value > LEVEL:
@@ -135,11 +136,8 @@ class _Undoing:
         return now.residual / float(np.sqrt(np.mean(hiss.target**2)))
 
     def gain(self, undo: Undo, time: float, width: int) -> float:
-        """The part of the energy that undoing a time takes through a kernel; 0 without rows."""
-        try:
-            before, after = self.rest(_as_it_is, 0.0, width), self.rest(undo, time, width)
-        except ValueError:
-            return 0.0
+        """The part of the energy that undoing a time takes away."""
+        before, after = self.rest(_as_it_is, 0.0, width), self.rest(undo, time, width)
         return float(1 - after @ after / (before @ before))
 
     def least(self, undo: Undo, guess: float, width: int | None = None) -> tuple[float, float]:
