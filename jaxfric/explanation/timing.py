@@ -91,6 +91,8 @@ def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 
             if tried[-1][2] @ tried[-1][2] > power:
                 break
             time *= 2
+        if len(tried) == 1:  # harm at once, and to first order a lag is a delay
+            return None
     undo, time, rest = min(tried, key=lambda each: each[2] @ each[2])
     gain = float(1 - rest @ rest / power)
     wide = asked.wide
