@@ -13,6 +13,7 @@ from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.effects import EFFECTS
 from jaxfric.explanation import (
     candidates,
+    chance,
     contest,
     evidence,
     explain,
@@ -263,8 +264,8 @@ def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypa
 def test_blocks_that_disagree_are_chance():
     block = np.repeat(np.arange(20), 5)
     one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)
-    assert timing._chance(np.stack([either, one_way]), block, 0) == pytest.approx(0.002)
-    assert timing._chance(either[None], block, 0) > 0.1
+    assert chance.agreement(np.stack([either, one_way]), block, 0) == pytest.approx(0.002)
+    assert chance.agreement(either[None], block, 0) > 0.1
 
 
 def test_what_the_motion_has_is_no_tone(healthy):

@@ -13,6 +13,7 @@ from ..recording import Recording
 from ..terms.base import AbstractTerm, Directional, summands
 from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
+from .predictions import PREDICTED
 from .regression import Space
 from .threads import begin
 
@@ -102,10 +103,6 @@ def _transform():
 _GAINS = _transform()
 
 
-# The signals that a fit predicts at the nodes.
-_PREDICTED = frozenset({"predicted_force", "predicted_acceleration"})
-
-
 class Field:
     """The candidates for one recording, and their columns, kept from round to round.
 
@@ -118,11 +115,11 @@ class Field:
         self._motion, self._rows, self._reach = evidence.motion, evidence.rows, evidence.reach
         # With all the signals that there will be, since programs are compiled for these.
         none = np.zeros(evidence.motion.num_samples)
-        seen = evidence.with_channels(**dict.fromkeys(_PREDICTED, none))
+        seen = evidence.with_channels(**dict.fromkeys(PREDICTED, none))
         self._kept = {
             id(candidate): begin(functools.partial(_columns, seen), candidate)
             for candidate in self.candidates
-            if not candidate.term.coordinates & _PREDICTED
+            if not candidate.term.coordinates & PREDICTED
         }
 
     def serves(self, evidence: Evidence) -> bool:

@@ -136,6 +136,20 @@ def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
     return np.arange(len(elapsed)) * count // len(elapsed)
 
 
+def agreement(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
+    """How likely the blocks agree by chance as much as they do on the best of several tries.
+
+    **Arguments:** `changes`, what each try takes off the squared residual, N², `(T, J)`; `block`
+    of each row, `(J,)`; `seed` of the signs.
+    """
+    count = int(block[-1]) + 1
+    sums = np.stack([np.bincount(block, change, count) for change in changes])
+    sums /= np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, count))
+    drawn = np.max(signs @ sums.T, axis=1)
+    return float((1 + np.sum(drawn >= np.max(sums.sum(axis=1)))) / (1 + DRAWS))
+
+
 def adjusted(gains: np.ndarray, drawn: np.ndarray) -> np.ndarray:
     """p-values of several statistics, paid for by the largest of each draw, `(C,)`.
 

@@ -13,6 +13,7 @@ from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .plausible import plausible
 from .predictions import with_predictions
+from .question import BETWEEN, Wider
 from .regression import Fit, fast, fit, without
 
 # A term is believed if it accounts for this much of the mean-square residual, too: below it, the
@@ -21,10 +22,6 @@ from .regression import Fit, fast, fit, without
 LEAST_SHARE = 0.03
 LATER_SHARE = 0.05
 MOST_TERMS = 4
-
-
-# Through a kernel a third wider, and twice as wide; `None` where too little would be left.
-Wider = tuple[Evidence | None, Evidence | None]
 
 
 class Taken(NamedTuple):
@@ -256,7 +253,7 @@ def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool
     swings = isinstance(finalist.trial.candidate.term, Compliance | DryCompliance)
     most = now.energy - finalist.energy >= MOST * now.energy
     loud = swings and most and between is not None
-    return loud and _alike(finalist, now, between, 4 / 3, least)
+    return loud and _alike(finalist, now, between, BETWEEN, least)
 
 
 def _alike(finalist: Finalist, now: Fit, wide: Evidence, factor: float, least: float) -> bool:

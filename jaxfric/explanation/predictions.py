@@ -7,6 +7,9 @@ from ..terms import ActuatorDeadband
 from .evidence import NODES, PAIR, Evidence, evaluate
 from .regression import Fit
 
+# The signals that a fit predicts at the nodes.
+PREDICTED = frozenset({"predicted_force", "predicted_acceleration"})
+
 
 def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """The evidence with the channels that some terms read, at the nodes.
@@ -16,7 +19,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """
     force, momentum = np.zeros((2, evidence.motion.num_samples))
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
-        if any(name.startswith("predicted_") for name in term.coordinates):
+        if term.coordinates & PREDICTED:
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
             term, jnp.asarray(np.repeat(beta[None], PAIR, axis=0)), evidence.motion

@@ -19,6 +19,12 @@ from .reversals import yields
 ALIGNED = 0.1
 
 
+# Between a kernel and one of twice the width: a third wider.
+BETWEEN = 4 / 3
+# Through that one and through the widest; `None` where too little would be left.
+Wider = tuple[Evidence | None, Evidence | None]
+
+
 class Question(NamedTuple):
     """A recording through a kernel and one of twice the width, its base fit, the held-out one.
 
@@ -40,7 +46,7 @@ class Question(NamedTuple):
     reversals: bool = False
 
     @property
-    def wider(self) -> tuple[Evidence | None, Evidence | None]:
+    def wider(self) -> Wider:
         """Through a kernel a third wider, and twice as wide."""
         return self.between, self.wide
 
@@ -96,15 +102,15 @@ def _aligned(motion, evidence: Evidence, holdout, structure, known, field: Field
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     if not field.serves(evidence):
         field = Field(evidence, structure)
-    between = _wider(motion, evidence, delay, across, 4 / 3)
+    between = _wider(motion, evidence, delay, across, BETWEEN)
     return Question(evidence, wide, between, held, base, block, structure, field, delay, across)
 
 
 def _wider(
     recording: Recording, narrow: Evidence, delay=0.0, across=False, factor=2.0
 ) -> Evidence | None:
-    """The recording through a wider kernel; `None` if there is none as narrow, or if too few rows
-    are left to judge by.
+    """The recording through a wider kernel; `None` if whole steps between the nodes allow none, or
+    too few rows would be left to judge by.
     """
     try:
         wide = gather(recording, round(factor * narrow.width), delay, across)

@@ -188,7 +188,9 @@ def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Fi
     return sorted(findings, key=lambda finding: -finding.share)
 
 
-def _shares(found: Named, asked: Question, rest, first: Fit, number: int):
+def _shares(
+    found: Named, asked: Question, rest, first: Fit, number: int
+) -> tuple[float, float | None]:
     """The part of the mismatch that a finding alone accounts for, here and held out.
 
     `None` for what no other recording can say. Of a force that acts late all that undoing it takes
@@ -202,7 +204,9 @@ def _shares(found: Named, asked: Question, rest, first: Fit, number: int):
     share = float((min(less.energy, named.base.energy) - left.last.energy) / first.energy)
     if asked.held is None or found.taken[number].trial.candidate.effect.name in OF_THE_MOMENT:
         return share, None
-    without, with_it = verification.both(less, left.last, (place.held, where.held), left.rephased)
+    without, with_it = verification.residuals(
+        less, left.last, (place.held, where.held), left.rephased
+    )
     power = np.sum(verification.residual(first, asked.held) ** 2)
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
 

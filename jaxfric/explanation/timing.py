@@ -18,7 +18,7 @@ from .. import terms as laws
 from ..effects import EFFECTS
 from ..recording import Recording
 from .candidates import Candidate
-from .chance import BLOCKS, DRAWS, LEVEL
+from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial
 from .evidence import gather
 from .naming import Named, Taken, least_gain
@@ -98,25 +98,12 @@ def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 
     wide = asked.wide
     if gain < MOST_LATE or (wide and undoing.gain(undo, time, wide.width) < MOST_LATE):
         return None
-    p_value = _chance(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
+    p_value = agreement(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
     if p_value > LEVEL:
         return None
     candidate = Candidate(EFFECTS["actuator_lag"], laws.ActuatorLag(), np.zeros((1, 0)))
     trial = Trial(candidate, np.zeros(0), gain, 0.0, 1, p_value, np.inf, 1.0)
     return _told_apart(undoing, time, Taken(trial, (), p_value), found.left.size)
-
-
-def _chance(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
-    """How likely the blocks agree by chance as much as they do on the best of some changes.
-
-    `changes`: what each of several tries takes off the squared residual, `(T, J)`.
-    """
-    count = int(block[-1]) + 1
-    sums = np.stack([np.bincount(block, change, count) for change in changes])
-    sums /= np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
-    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, count))
-    drawn = np.max(signs @ sums.T, axis=1)
-    return float((1 + np.sum(drawn >= np.max(sums.sum(axis=1)))) / (1 + DRAWS))
 
 
 class _Undoing:

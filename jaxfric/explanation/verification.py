@@ -89,7 +89,7 @@ def share(
     less: Fit, more: Fit, base: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
 ) -> float:
     """Part of the base's mean-square residual elsewhere that `more` removes beyond `less`."""
-    left, right = both(less, more, (evidence, evidence), rephased)
+    left, right = residuals(less, more, (evidence, evidence), rephased)
     power = float(np.sum(residual(base, evidence) ** 2))
     return float(np.sum(left**2) - np.sum(right**2)) / power
 
@@ -100,13 +100,13 @@ def helps(less: Fit, more: Fit, evidence: Evidence, rephased: frozenset[int]) ->
     Both residuals are cut off at four of their standard deviations, by the median: isolated events
     of that recording are not what a term is judged by.
     """
-    left, right = both(less, more, (evidence, evidence), rephased)
+    left, right = residuals(less, more, (evidence, evidence), rephased)
     limit = 4 * np.median(np.abs(right)) / 0.6745
     left, right = (np.minimum(np.abs(r), limit) for r in (left, right))
     return bool(np.sum(left**2) > np.sum(right**2))
 
 
-def both(
+def residuals(
     less: Fit, more: Fit, views: tuple[Evidence, Evidence], rephased: frozenset[int]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of two fits, each on its view of another recording, with nothing refitted.
