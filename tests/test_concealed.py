@@ -11,6 +11,7 @@ from jaxfric.catalogue import CATALOGUE
 from jaxfric.concealed.kinds import KINDS
 from jaxfric.concealed.nominal import friction, rms
 from jaxfric.concealed.tuning import in_loop
+from jaxfric.proof import planning
 
 SIZE = 0.12
 # Where a lag makes the force differ most, at a reversal, its size does not count (slip alone does).
@@ -101,6 +102,14 @@ def test_the_flanks_of_a_gap_give_way_by_less_than_it():
     for seed in (64, 66, 69):
         truth = concealed.draw(seed, ("backlash",)).truth["backlash"]
         assert 0 < truth["windup"] <= 0.5001 * truth["half_gap"], seed
+
+
+def test_a_stop_is_where_the_axis_comes_to_it():
+    """This one stays so far behind its set-point that a stop by the set-point is never reached."""
+    (seed,) = (c.seed for c in planning.plan(360, 20261129, (0.02, 0.3)) if c.name == "00044")
+    machine = concealed.draw(seed, ("end_stop",))
+    force = concealed.record(machine).hidden["end_stop"]
+    assert rms(force) / machine.coulomb == pytest.approx(machine.truth["end_stop"]["size"], rel=0.2)
 
 
 def check(name, seed, machine, run):

@@ -168,6 +168,19 @@ def test_an_effect_shows_where_knowing_it_helps_or_nobody_was_asked():
     assert not shows(before=0.1, oracle=0.091)
 
 
+@pytest.mark.parametrize(
+    ("without", "shown"),
+    [((0.08, 0.05), True), ((0.08, 0.041), False), ((0.041, 0.08), False), ((None, None), True)],
+)
+def test_two_effects_show_where_knowing_each_of_them_helps(without, shown):
+    names = ("cogging", "stribeck")
+    said = answer(oracle=0.04) | {"oracle_without": dict(zip(names, without, strict=True))}
+    pair = case(*names, kind="pair")
+    found = scoring.score(pair, sealed(cogging={}, stribeck={}), said)
+    assert found.shows is shown and found.reached is not None
+    assert proof.summary([found])["two effects that show: both named"] == (0, int(shown))
+
+
 def test_a_case_that_went_wrong_is_a_miss_in_every_rate():
     wrong = scoring.score(case("cogging"), None, trials.failed("it broke") | {"code": None})
     table = proof.summary([wrong])

@@ -97,17 +97,21 @@ HARDENING: Kind = Kind(
 
 def _draw_stop(rng, n, size):
     upper, share = bool(rng.random() < 0.5), rng.uniform(0.04, 0.12)
-    truth = {"side": "upper" if upper else "lower"}
-    truth["stop_position" if upper else "lower_stop_position"] = _at(
-        n, 1 - share if upper else share
-    )
+    edge, place = (n.x.max(), _at(n, 1 - share)) if upper else (n.x.min(), _at(n, share))
+    truth = _placed({"side": "upper" if upper else "lower", "depth": float(abs(edge - place))}, n)
     stiffness = "stop_stiffness" if upper else "lower_stop_stiffness"
     truth = scaled(STOP, stiffness, truth, n, size)
     # The stop pushes the axis back by k/(k + kp) of the way that the set-point goes into it.
-    truth["size"] = STOP.measure(truth, n)
     asked, loop = truth[stiffness], n.physics["kp"]
     truth[stiffness] = asked * loop / max(loop - asked, 0.3 * loop)
     return truth
+
+
+def _placed(truth, n):
+    """The stop is where the set-point goes into it as deep as that."""
+    if truth["side"] == "upper":
+        return {**truth, "stop_position": float(n.x.max()) - truth["depth"]}
+    return {**truth, "lower_stop_position": float(n.x.min()) + truth["depth"]}
 
 
 def _stop_force(truth, n):
@@ -124,7 +128,14 @@ def _stop(truth, base):
 
 
 STOP: Kind = Kind(
-    _draw_stop, _stop_force, _stop, lambda truth: f"the {truth['side']} end of the stroke"
+    _draw_stop,
+    _stop_force,
+    _stop,
+    lambda truth: f"the {truth['side']} end of the stroke",
+    # An axis that stays behind its set-point may not reach the stop.
+    tuned="depth",
+    bounds=lambda n: (2e-3 * n.plan.stroke, 0.45 * n.plan.stroke),
+    complete=_placed,
 )
 
 

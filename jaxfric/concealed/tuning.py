@@ -15,7 +15,11 @@ _STEP = 2.0
 
 # A size is drawn from a range of a decade: a sixth more or less is as drawn.
 _CLOSE = 0.15
-_ROUNDS = 3
+_ROUNDS = 4
+# What is hardly there, a stop that is just not reached, would make the power law a cliff; between
+# sizes so far apart it says little.
+_HARDLY = 0.1
+_FAR = 10.0
 
 
 def tune(machine: Machine, name: str, truth: Truth, n: Nominal, size: float) -> Truth:
@@ -23,35 +27,38 @@ def tune(machine: Machine, name: str, truth: Truth, n: Nominal, size: float) -> 
 
     The size in `truth` is what was reached: it can differ where the parameter meets a bound.
     """
+    step = _STEP
     for _ in range(_ROUNDS):
-        truth, foreseen = _improved(machine, name, truth, n, size)
-        if foreseen:
+        truth, between, known = _improved(machine, name, truth, n, size, step)
+        if known:
             break
+        step = np.sqrt(step) if between else _STEP
     return truth
 
 
-def _improved(machine, name, truth, n, size):
-    """A better truth, and whether its size lies between two that were simulated.
+def _improved(machine, name, truth, n, size, step):
+    """A better truth; whether its size lies between two that were simulated, and is known by them.
 
-    Two machines with the parameter half and double as large, and only this effect, run the
+    Two machines with the parameter a step smaller and larger, and only this effect, run the
     identification's motion; size over parameter is taken as a power law between and, by no more
-    than another factor of two, beyond them.
+    than another step, beyond them.
     """
     kind = KINDS[name]
     low, high = kind.bounds(n)
     first = truth[kind.tuned]
-    tried = np.clip([first / _STEP, first * _STEP], low, high)
+    tried = np.clip([first / step, first * step], low, high)
     truths = [kind.complete({**truth, kind.tuned: float(value)}, n) for value in tried]
-    sizes = _sizes(machine, name, truths)
+    sizes = np.maximum(_sizes(machine, name, truths), _HARDLY * size)
     span = np.diff(np.log(tried))[0]
     # A size that does not grow with the parameter says nothing about where to look for more.
     slope = max(np.diff(np.log(sizes))[0] / span, 0.1)
     wanted = tried[0] * (size / sizes[0]) ** (1 / slope)
-    value = float(np.clip(wanted, max(low, tried[0] / _STEP), min(high, tried[1] * _STEP)))
+    value = float(np.clip(wanted, max(low, tried[0] / step), min(high, tried[1] * step)))
     reached = float(sizes[0] * (value / tried[0]) ** slope)
     between = tried[0] * np.exp(-_CLOSE) < value < tried[1] * np.exp(_CLOSE)
     better = kind.complete({**truth, kind.tuned: value}, n) | {"size": reached}
-    return better, between or wanted < low or wanted > high
+    known = between and sizes[1] < _FAR * sizes[0]
+    return better, between, known or value in (low, high)
 
 
 def _sizes(machine, name, truths):

@@ -175,8 +175,8 @@ RAREST = 1.5 / (1 + DRAWS)
 # What comes after stronger terms must also be this part of what the base left, or most of what
 # they leave: no term has quite the shape of what it stands for, and a tenth of its amplitude may
 # stay. No law has the shape of that remainder either, so that it takes the smaller part of it.
-# Below a twentieth of the amplitude the best of shapes leaves something that a law may follow.
-OF_BASE, LEAST_OF_BASE = 0.01, 0.002
+# Below a hundredth of the amplitude no force is known to follow its law.
+OF_BASE, LEAST_OF_BASE = 0.01, 1e-4
 MOST = 0.5
 # Isolated pushes besides another effect are mostly where that effect switches, and terms on the
 # force's own derivatives take what a strong effect leaves through the kernel; a load behind a gap
@@ -189,6 +189,9 @@ EASY = frozenset(
 # dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
 REVERSAL_OF_BASE = 0.25
+# None of these floors is for what takes nine tenths of what is left: what an idealisation leaves is
+# not of one law's shape, and what a law took of it that was not there was under half.
+NEARLY_ALL = 0.9
 
 
 def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken]):
@@ -226,9 +229,9 @@ def least_gain(
     """
     again = any(earlier.name in AT_REVERSALS for earlier in before)
     if again and (effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"):
-        return REVERSAL_OF_BASE * base
+        return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
     if effect.name in EASY:
-        return EASY_OF_BASE * base
+        return min(EASY_OF_BASE * base, NEARLY_ALL * left)
     return max(floor * base, min(OF_BASE * base, MOST * left))
 
 

@@ -2,8 +2,8 @@
 
 A column T dû/dt cannot tell u = f(t + τ) from u = f + T df/dt. But the recorded force can be put
 back: taken τ earlier, or passed through the lag 1/(1 + T s). The one that leaves less is the
-better account, by how much noise of the force each of them would leave on its own. A time as long
-as the kernel is wide shows in no column; undoing it does.
+better account, with what noise of the force it takes away on its own added again. A time as long as
+the kernel is wide shows in no column; undoing it does.
 """
 
 import dataclasses
@@ -24,7 +24,7 @@ from .evidence import gather
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .question import Question, from_position
-from .regression import Fit, fit, without
+from .regression import Fit, fast, fit, without
 
 Undo = Callable[[Recording, float], Recording]
 
@@ -115,14 +115,28 @@ class _Undoing:
         self.terms, self.betas = zip(*(p for p in pairs if not isinstance(p[0], LATE)), strict=True)
         noise = np.random.default_rng(0).normal(size=self.motion.num_samples)
         self.noise = dataclasses.replace(self.motion, force=jnp.asarray(noise))
+        self.hiss = functools.cache(self._hiss)
+        narrow = self.hiss(_as_it_is, 0.0, asked.evidence.width)
+        self.power = fast(known) ** 2 / narrow  # of the force's noise, in the time domain, N²
+
+    def _hiss(self, undo: Undo, time: float, width: int) -> float:
+        """What white noise of the force leaves in a row, in parts of its power."""
+        rows = gather(undo(self.noise, time), width, reversals=self.asked.reversals).target
+        return float(np.mean(rows**2))
 
     def rest(self, undo: Undo, time: float, width: int | None = None) -> np.ndarray:
-        """What the refitted terms leave once a time is undone, per unit of force noise, `(J,)`."""
+        """What the refitted terms leave once a time is undone, N, `(J,)`.
+
+        A lag undone takes noise away, too, which says nothing for it: what there is of noise in the
+        rest counts as if it were untouched. What else is in the rest is left by both ways alike.
+        """
         asked, width = self.asked, width or self.asked.evidence.width
         view = gather(undo(self.motion, time), width, asked.delay, asked.reversals)
         now = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
-        hiss = gather(undo(self.noise, time), width, reversals=asked.reversals)
-        return now.residual / float(np.sqrt(np.mean(hiss.target**2)))
+        before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
+        left = float(np.mean(now.residual**2))
+        noisy = min(self.power * after / left, 1.0) if left > 0 else 1.0
+        return now.residual * float(np.sqrt(1 + noisy * (before / after - 1)))
 
     def gain(self, undo: Undo, time: float, width: int) -> float:
         """The part of the energy that undoing a time takes away."""

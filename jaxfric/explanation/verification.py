@@ -111,7 +111,7 @@ def residuals(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of two fits, each on its view of another recording, with nothing refitted.
 
-    Terms of a moment are left out, but for what tells the two apart.
+    Terms of a moment are left out unless they return there, but for what tells the two apart.
     """
     others = frozenset(
         next(i for i, term in enumerate(less.terms) if term is more.terms[n])
@@ -125,10 +125,15 @@ def residuals(
         )
         for now in (less, more)
     ]
-    return (
-        residual(less, views[0], others, idle[0]),
-        residual(more, views[1], rephased, idle[1]),
-    )
+
+    def pair(skipped) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            residual(less, views[0], others, skipped[0]),
+            residual(more, views[1], rephased, skipped[1]),
+        )
+
+    ways = [idle, [frozenset()] * 2] if idle[1] else [idle]
+    return min(map(pair, ways), key=lambda both: both[1] @ both[1])
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:

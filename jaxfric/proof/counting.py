@@ -131,6 +131,7 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
         "two effects: both and nothing else": rate(pair, lambda s: s.exact),
         "two effects: both named": rate(pair, lambda s: s.among),
         "two effects: at least one named": rate(pair, lambda s: s.hits > 0),
+        "two effects that show: both named": rate([s for s in pair if s.shows], lambda s: s.among),
         "outside the library: not called consistent": rate(
             outside, lambda s: s.error is None and s.verdict != "consistent"
         ),

@@ -44,8 +44,9 @@ class Score(NamedTuple):
       `within`: each true effect is named, or declared confusable with a named one.
     - `located`: one of the coordinates that the catalogue gives each true effect is among those
       on which structure was found or a finding acts; `None` for effects outside the library.
-    - `before`, `after`, `oracle`: held-out force errors; `run_before`, `run_after`: held-out
-      velocity errors of the models run forward.
+    - `before`, `after`, `oracle`: held-out force errors; `without`: the oracle's, of several
+      effects, if it knows all but one; `run_before`, `run_after`: held-out velocity errors of the
+      models run forward.
     - `parameters` that truth and finding both have; `seconds` that `explain` took; `code`.
     """
 
@@ -65,6 +66,7 @@ class Score(NamedTuple):
     before: float | None = None
     after: float | None = None
     oracle: float | None = None
+    without: tuple[float | None, ...] = ()
     run_before: float | None = None
     run_after: float | None = None
     parameters: tuple[Parameter, ...] = ()
@@ -74,18 +76,19 @@ class Score(NamedTuple):
     @property
     def reached(self) -> float | None:
         """Part of the oracle's reduction of the held-out error; `None` where that is too small."""
-        if None in (self.before, self.after, self.oracle) or not self.shows:
+        if None in (self.before, self.after, self.oracle):
+            return None
+        if not _removes(self.oracle, self.before):
             return None
         return (self.before - self.after) / (self.before - self.oracle)
 
     @property
     def shows(self) -> bool:
-        """Whether knowing the truth lowers the held-out error: else the baseline imitates it, or it
-        is within the noise. Nobody knows of one without an oracle: then it does.
+        """Whether knowing the truth lowers the held-out error, of several effects that of each:
+        else the baseline imitates it, or it is within the noise. Nobody knows of one without an
+        oracle: then it does.
         """
-        if self.before is None or self.oracle is None:
-            return True
-        return self.before - self.oracle >= LEAST_REDUCTION * self.before
+        return all(_removes(self.oracle, error) for error in self.without or (self.before,))
 
     @property
     def hits(self) -> int:
@@ -131,10 +134,16 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         before=held.get("before"),
         after=held.get("after"),
         oracle=answer["oracle"],
+        without=tuple(answer.get("oracle_without", {}).values()),
         run_before=run.get("before"),
         run_after=run.get("after"),
         parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
     )
+
+
+def _removes(oracle: float | None, error: float | None) -> bool:
+    """Whether the oracle's error is smaller by the least part; where there is none, yes."""
+    return None in (oracle, error) or error - oracle >= LEAST_REDUCTION * error
 
 
 def _located(effects: Sequence[str], where: Sequence[Mapping[str, Any]]) -> bool | None:

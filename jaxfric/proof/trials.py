@@ -44,6 +44,8 @@ def trial(case: Case, folder: Path) -> None:
         recording = _nameless(run.recording, case)
         answer = answered(recording, machine.baseline, _nameless(run.holdout, case))
         answer["oracle"] = oracle(run, machine) if machine.effects else None
+        several = machine.effects if len(machine.effects) > 1 else ()
+        answer["oracle_without"] = {name: oracle(run, machine, name) for name in several}
     except Exception as error:  # a proof of hundreds of cases outlives any one of them
         answer = failed(f"{type(error).__name__}: {error}")
     answer |= {"case": case.name, "code": code}
@@ -110,20 +112,24 @@ def _run(found: Explanation, recording: Recording, holdout: Recording | None) ->
     return errors
 
 
-def oracle(run: Run, machine: Machine) -> float | None:
+def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
     """The held-out force error that would be left if the concealed force were known exactly.
 
-    The true concealed force is subtracted from the measured force of both recordings; the baseline
-    is fitted to what is left of the first, and predicts what is left of the second with nothing
-    refitted. The norm of that residual over the norm of the held-out force as measured is the
-    error, over the rows, and by the kernel and the alignment, that `explain` chooses for the
-    recordings without the concealed force. `None` where no one could know the held-out force.
+    With the name of an effect that is `unknown`, if only the others' were. The true concealed
+    force is subtracted from the measured force of both recordings; the baseline is fitted to what
+    is left of the first, and predicts what is left of the second with nothing refitted. The norm
+    of that residual over the norm of the held-out force as measured is the error, over the rows,
+    and by the kernel and the alignment, that `explain` chooses for the recordings without the
+    concealed force. `None` where no one could know the held-out force.
     """
     if UNREPEATED & set(machine.effects):
         return None
     structure = named(machine.baseline)
-    clean = _without(run.recording, run.hidden)
-    known = ask(clean, _without(run.holdout, run.hidden_holdout), structure)
+    first, second = (
+        {name: force for name, force in hidden.items() if name != unknown}
+        for hidden in (run.hidden, run.hidden_holdout)
+    )
+    known = ask(_without(run.recording, first), _without(run.holdout, second), structure)
     measured = gather(from_position(run.holdout), known.evidence.width, known.delay).target
     return _norm(residual(known.base, known.held)) / _norm(measured)
 

@@ -31,7 +31,8 @@ that disturbs. Its answer is written to `answers/`. Scoring opens `sealed/` afte
   measured. *Part of the oracle's reduction*: (before − after)/(before − oracle), of cases where
   the oracle removes {LEAST_REDUCTION:.0%} of the error or more, and not of `disturbance_pulses`,
   which come at other moments in the held-out recording. An effect *shows* where the oracle removes
-  as much, or is not asked: else the baseline imitates its force, or the noise hides it.
+  as much, or is not asked: else the baseline imitates its force, or the noise hides it. Two effects
+  show where the oracle removes as much of what one is left with who knows either of them.
 - *Velocity run forward*: the model, driven by the held-out force, is started anew from the
   recorded motion every fifth of the time between reversals; norm of what its velocity is off over
   norm of the velocity. Of cases where something was found and both models can run: not presliding,
