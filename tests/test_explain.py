@@ -246,6 +246,19 @@ def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
     assert found[0][0] < 0.5 * undoing.least(timing.WAYS["actuator_lag"], 9.5e-3)[0]
 
 
+def test_of_the_rest_only_noise_is_made_up_for_what_undoing_a_lag_takes_of_it(healthy):
+    asked = question.ask(healthy[0], None, models.named("gaussian"))
+    undoing = timing._Undoing(healthy[0], asked, asked.base)
+    lag, width, time = timing.WAYS["actuator_lag"], asked.evidence.width, 8e-3
+    taken = undoing.hiss(timing._as_it_is, 0.0, width) / undoing.hiss(lag, time, width)
+    sizes = []
+    for undoing.power in (0.0, np.inf):
+        rest = undoing.rest(lag, time)
+        sizes.append(float(rest @ rest))
+    assert taken > 1.2
+    assert sizes[1] / sizes[0] == pytest.approx(taken)
+
+
 def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypatch):
     now = types.SimpleNamespace(energy=1.0)
     monkeypatch.setattr(naming, "_alike", lambda finalist, now, view, *_: view == "between")

@@ -190,7 +190,7 @@ EASY = frozenset(
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
 REVERSAL_OF_BASE = 0.25
 # None of these floors is for what takes nine tenths of what is left: what an idealisation leaves is
-# not of one law's shape, and laws that were not there took two thirds of it at most.
+# not of one law's shape; on machines with one effect a second name took two thirds of it at most.
 NEARLY_ALL = 0.9
 
 

@@ -130,6 +130,7 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
         for hidden in (run.hidden, run.hidden_holdout)
     )
     known = ask(_without(run.recording, first), _without(run.holdout, second), structure)
+    known.field.close()  # nobody asks for the candidates' columns
     measured = gather(from_position(run.holdout), known.evidence.width, known.delay).target
     return _norm(residual(known.base, known.held)) / _norm(measured)
 
