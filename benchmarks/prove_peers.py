@@ -37,7 +37,7 @@ from jaxfric.cli import _configure
 from jaxfric.explanation import verification
 from jaxfric.explanation.contest import contest
 from jaxfric.explanation.predictions import with_predictions
-from jaxfric.explanation.question import ask
+from jaxfric.explanation.question import ask, opened
 from jaxfric.io import write_text
 from jaxfric.proof.counting import middle, rate
 from jaxfric.proof.planning import PATTERN
@@ -90,6 +90,7 @@ def judge(sealed, wanted):
     structure = models.named(machine.baseline)
     recording, holdout = (dataclasses.replace(r, source="") for r in (run.recording, run.holdout))
     asked = ask(recording, holdout, structure)
+    asked = opened(recording, holdout, asked) or asked
     found = {}
     if set(wanted) & set(methods.SELECTING):
         found |= select(asked, recording, [m for m in wanted if m in methods.SELECTING])

@@ -584,3 +584,28 @@ def test_an_error_contains_what_another_width_changes():
 
     assert widened([5.0, 5.2], [0.1, 0.3]) == 0.1
     assert widened([5.0, 6.0], [0.1, 0.3]) == pytest.approx(np.sqrt(0.1**2 + 1.0 - 0.3**2))
+
+
+def test_findings_bring_a_model_nearer_to_the_held_out_recording(healthy, monkeypatch):
+    # Each may seem to help, judged without that recording's events, while all of them do harm.
+    asked = question.ask(
+        planted(healthy[0], *CASES["cogging"]), healthy[1], models.named("gaussian")
+    )
+    found = naming.search(asked.evidence, asked.base, asked.field)
+    monkeypatch.setattr(explaining, "_holds", lambda *_: True)
+    there = verification.error(asked.base, asked.held)
+    assert [t.trial.candidate.effect.name for t in found.taken] == ["cogging"]
+    assert verification.error(found.last, asked.held) > there
+    left = explaining._verified(found, asked, 0)
+    assert not left.taken and len(left.last.terms) == 1
+    # What belongs to a moment need not be there.
+    momentary = [
+        taken._replace(
+            trial=taken.trial._replace(
+                candidate=taken.trial.candidate._replace(effect=EFFECTS["friction_step"])
+            )
+        )
+        for taken in found.taken
+    ]
+    kept = found._replace(taken=momentary)
+    assert explaining._verified(kept, asked, 0) is kept

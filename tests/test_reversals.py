@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxfric import Recording, explain
-from jaxfric.explanation import evidence, question, regression, reversals
+from jaxfric.explanation import evidence, explaining, naming, question, regression, reversals
 from jaxfric.models import named
 
 COUNT, RATE = 24000, 1000.0
@@ -102,3 +102,38 @@ def test_presliding_of_a_few_counts_is_named_with_its_distance():
     parameters = found.findings[0].parameters
     assert abs(float(parameters["presliding_distance"].value) - DISTANCE) < 0.35 * DISTANCE
     assert abs(float(parameters["presliding_force"].value) - LEVEL) < 0.15 * LEVEL
+
+
+def hilly(seed=0):
+    """Presliding beside a force of position."""
+    recording = yielding(seed=seed)
+    hills = 3.0 * np.sin(2 * np.pi * recording.position / 0.02)
+    return dataclasses.replace(recording, force=recording.force + hills)
+
+
+def searched(recording):
+    asked = question.ask(recording, None, named("symmetric-coulomb-viscous"))
+    return explaining._searched(recording, None, asked, 0)
+
+
+def names(found):
+    return [taken.trial.candidate.effect.name for taken in found.taken]
+
+
+def test_what_does_not_act_at_reversals_is_found_without_them():
+    asked, found = searched(hilly())
+    assert asked.reversals and not asked.within.reversals
+    assert names(found.start) == ["cogging"] and names(found)[0] == "cogging"
+    assert set(names(found)[1:]) <= naming.AT_REVERSALS and len(found.taken) > 1
+    # Refuted or of the reversals, it is no start for another search.
+    for gone in ("cogging", "presliding"):
+        last, taken = naming._elsewhere(found, frozenset({gone}))
+        assert [t.trial.candidate.effect.name for t in taken] == ["cogging"] * (gone != "cogging")
+        assert len(last.terms) == len(last.betas) == len(last.alphas) == 1 + len(taken)
+
+
+def test_an_axis_that_sticks_is_asked_once():
+    recording = sticking()
+    asked, found = searched(recording)
+    assert not asked.reversals and found.start is None
+    assert question.opened(recording, None, asked) is None

@@ -76,8 +76,17 @@ class Contest(NamedTuple):
     size: float
 
 
-def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contest:
-    """Let every candidate compete for the residual of a fit; `evidence` with its predictions."""
+def contest(
+    evidence: Evidence,
+    now: Fit,
+    field: Field,
+    seed: int = 0,
+    among: frozenset[str] = frozenset(),
+) -> Contest:
+    """Let every candidate compete for the residual of a fit; `evidence` with its predictions.
+
+    `among`: effects of which alone there are finalists; all of them where it is empty.
+    """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     judge = Judge(now, block, seed)
@@ -107,7 +116,8 @@ def contest(evidence: Evidence, now: Fit, field: Field, seed: int = 0) -> Contes
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.chance for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
-    return Contest(trials, _finals(seen, now, trials, size), size)
+    asked = [t for t in trials if not among or t.candidate.effect.name in among]
+    return Contest(trials, _finals(seen, now, asked, size), size)
 
 
 def _trial(judge, candidate, own, scan, p_value, limit) -> Trial:

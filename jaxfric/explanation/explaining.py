@@ -19,10 +19,10 @@ from .explained import Explanation
 from .forward import motion_error
 from .naming import LEAST_OF_BASE, Named, search
 from .predictions import with_predictions
-from .question import ALIGNED, Question, ask
+from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
 from .telling import tell
-from .timing import late, overlooked, settled
+from .timing import LATE, late, overlooked, settled
 
 
 def explain(
@@ -93,7 +93,10 @@ def _with_the_force_put_back(
     To first order a delay is a column; what it leaves of second order would be named too. So where
     the force acts late it is put back, and the search is done once more.
     """
-    lateness = late(recording, asked, found)
+    lateness = None
+    if any(isinstance(term, LATE) for term in found.last.terms):
+        # Rows across reversals hold more than a delay or a lag, of which not all may be known.
+        lateness = late(recording, asked.within or asked, found.start or found)
     sure = lateness is not None
     lateness = lateness or overlooked(recording, asked, found, seed)
     if lateness is None:
@@ -102,11 +105,7 @@ def _with_the_force_put_back(
     there, behind = _proved(lateness.undone(recording), later, structure, seed, asked)
     both, behind = settled(found, behind, lateness, asked, there)
     if not sure and later is not None:
-        errors = (
-            verification.error(behind.last, there.held),
-            verification.error(found.last, asked.held, found.rephased),
-        )
-        if errors[0] >= errors[1]:
+        if _error(behind, there) >= _error(found, asked):
             return found, (asked, found)
     return both, (there, behind)
 
@@ -120,9 +119,12 @@ def _known(baseline, seed: int) -> Baseline:
 
 def _as_given(known: Baseline, asked: Question, seed) -> tuple[Question, Named]:
     """The search with the baseline's own values, which nothing on the recording contradicts."""
-    base = at_values(known.model, asked.evidence)
-    asked = asked._replace(base=base)
-    return asked, search(asked.evidence, base, asked.field, asked.wider, seed)
+    start = None
+    if asked.within is not None:
+        within, start = _as_given(known, asked.within, seed)
+        asked = asked._replace(within=within)
+    asked = asked._replace(base=at_values(known.model, asked.evidence))
+    return asked, _sought(asked, seed, start=start)
 
 
 def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
@@ -137,11 +139,11 @@ def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question,
     refuted = _names(first) - _names(found)
     if not refuted:
         return asked, found
-    again = search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted)
+    again = _sought(asked, seed, refuted, first.start)
     _check_signals(again, recording, holdout)
     again = _verified(again, asked, seed)
-    errors = [verification.error(each.last, asked.held, each.rephased) for each in (found, again)]
-    return asked, again if _names(again) > _names(found) and errors[1] < errors[0] else found
+    nearer = _names(again) > _names(found) and _error(again, asked) < _error(found, asked)
+    return asked, again if nearer else found
 
 
 def _check_signals(found: Named, recording, holdout) -> None:
@@ -167,23 +169,39 @@ def _names(found: Named) -> frozenset[str]:
 def pursue(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
     """The question, put again if what was found changes how force and motion are aligned."""
     asked = ask(recording, holdout, structure, before=before)
-    found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
+    asked, found = _searched(recording, holdout, asked, seed)
     if found.taken:
         again = ask(recording, holdout, structure, found.last, asked)
         if abs(again.delay - asked.delay) > ALIGNED * asked.evidence.limits.interval:
-            asked = again
-            found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
+            asked, found = _searched(recording, holdout, again, seed)
     return asked, found
 
 
+def _searched(recording, holdout, asked: Question, seed) -> tuple[Question, Named]:
+    """What the rows without reversals show, and then, where they say something, those across.
+
+    The latter hold what acts at reversals tenfold, and hide the rest behind what of it no term
+    has quite the shape of.
+    """
+    found = _sought(asked, seed)
+    across = opened(recording, holdout, asked)
+    return (asked, found) if across is None else (across, _sought(across, seed, start=found))
+
+
+def _sought(asked: Question, seed, refuted: frozenset[str] = frozenset(), start=None) -> Named:
+    return search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start)
+
+
 def _verified(found: Named, asked: Question, seed) -> Named:
-    """Without terms that do not help on the held-out recording."""
+    """Without terms that do not help on the held-out recording, each beside the others.
+
+    Each is judged without that recording's events, by which it may be far off; all of them together
+    are to be nearer to it than the baseline as it is.
+    """
     if asked.held is None:
         return found
-    evidence = with_predictions(asked.evidence, found.last)
-    for number in reversed(range(len(found.taken))):
-        if found.taken[number].trial.candidate.effect.name in OF_THE_MOMENT:
-            continue
+    evidence, first = with_predictions(asked.evidence, found.last), found
+    for number in reversed(_lasting(found)):
         less = verification.lacking(found, evidence, number)
         place = len(found.last.terms) - len(found.taken) + number
         if _holds(less, found, asked, found.rephased):
@@ -195,10 +213,29 @@ def _verified(found: Named, asked: Question, seed) -> Named:
             ]
             found = found._replace(taken=taken)
             continue
-        taken = [t for i, t in enumerate(found.taken) if i != number]
-        left = contest(evidence, less, asked.field, seed)
-        found = found._replace(last=less, taken=taken, left=left)
+        found = _lacking(found, evidence, number)
+    before = verification.error(found.base, asked.held)
+    while _lasting(found) and _error(found, asked) > before:
+        fewer = [_lacking(found, evidence, number) for number in _lasting(found)]
+        found = min(fewer, key=lambda each: _error(each, asked))
+    if len(found.taken) < len(first.taken):
+        found = found._replace(left=contest(evidence, found.last, asked.field, seed))
     return found
+
+
+def _lasting(found: Named) -> list[int]:
+    """Numbers of the findings that another recording has to show too."""
+    names = [taken.trial.candidate.effect.name for taken in found.taken]
+    return [number for number, name in enumerate(names) if name not in OF_THE_MOMENT]
+
+
+def _lacking(found: Named, evidence, number: int) -> Named:
+    less = verification.lacking(found, evidence, number)
+    return found._replace(last=less, taken=[t for i, t in enumerate(found.taken) if i != number])
+
+
+def _error(found: Named, asked: Question) -> float:
+    return verification.error(found.last, asked.held, found.rephased)
 
 
 # On the held-out recording a later term has to take the least part of the baseline's mismatch that

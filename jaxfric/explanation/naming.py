@@ -41,7 +41,8 @@ class Named(NamedTuple):
 
     `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
     contest for what remains; `smoothed`: what kernel and sampling make of the time by which the
-    force is late, where it is, s.
+    force is late, where it is, s; `start`: what rows without reversals had shown, where these reach
+    across them.
     """
 
     base: Fit
@@ -49,6 +50,7 @@ class Named(NamedTuple):
     taken: list[Taken]
     left: Contest
     smoothed: float = 0.0
+    start: "Named | None" = None
 
     @property
     def rephased(self) -> frozenset[int]:
@@ -64,19 +66,26 @@ def search(
     wider: Wider = (None, None),
     seed: int = 0,
     refuted: frozenset[str] = frozenset(),
+    start: Named | None = None,
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
     **Arguments:** `field`: the candidates; `wider`: the recording through wider kernels, where
     terms that act on derivatives of the force must show alike; `refuted`: effects that are out of
-    question.
+    question; `start`: what the rows without reversals have shown, where these reach across them.
+    Then only what acts there is looked for: all else has been, where nothing of that hides it.
     """
-    now = base
-    taken: list[Taken] = []
+    now, taken, among, kept = base, list[Taken](), frozenset[str](), 0
     evidence = with_predictions(evidence, now)
+    if start is not None:
+        # The base would bend its curve to what acts at reversals; without them it did not.
+        now, taken = _elsewhere(start, refuted)
+        now = fit(now.terms, with_predictions(evidence, now), now.betas, 0)
+        evidence = with_predictions(evidence, now)
+        among, kept = AT_REVERSALS, len(taken)
     visited: set[tuple[str, ...]] = set()
     while True:
-        round_ = contest(evidence, now, field, seed)
+        round_ = contest(evidence, now, field, seed, among)
         machines = [
             f
             for f in round_.finalists
@@ -87,7 +96,10 @@ def search(
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
-            return Named(base, now, taken, round_)
+            if start is not None and len(taken) == kept:
+                betas = (base.betas[0], *now.betas[1:])
+                now = fit(now.terms, evidence, betas, 6) if taken else base
+            return Named(base, now, taken, round_, start=start)
         visited.add(names)
         best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
         taken.append(Taken(best.trial, rivals, best.p_value))
@@ -276,6 +288,14 @@ def _alike(finalist: Finalist, now: Fit, wide: Evidence, factor: float, least: f
     positive = bool(np.all(there.alphas[0] > 0))
     enough = less.energy - there.energy >= least * less.energy
     return positive and 1 / factor < ratio < factor and enough
+
+
+def _elsewhere(found: Named, refuted: frozenset[str]) -> tuple[Fit, list[Taken]]:
+    """What was found but for what acts at reversals or is out of question."""
+    gone, start = AT_REVERSALS | refuted, len(found.last.terms) - len(found.taken)
+    kept = [i for i, t in enumerate(found.taken) if t.trial.candidate.effect.name not in gone]
+    last = found.last.only([*range(start), *(start + i for i in kept)])
+    return last, [found.taken[i] for i in kept]
 
 
 def _pruned(evidence, now, taken, size):

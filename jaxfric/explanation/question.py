@@ -29,9 +29,9 @@ class Question(NamedTuple):
     """A recording through a kernel and one of twice the width, its base fit, the held-out one.
 
     `between`: through a kernel a third wider, where there is one; `delay`: how much later the
-    force was taken, s; `block`: of each row; `structure`: the baseline; `field`: the candidates,
-    with their columns; `reversals`: whether rows reach across reversals, where the axis moves
-    instead of sticking.
+    force was taken, s; `block`: of each row; `structure`: the baseline; `fields`: the candidates
+    with their columns, and, kept, those of other rows of this motion; `within`: where rows reach
+    across reversals, the question with those that do not.
     """
 
     evidence: Evidence
@@ -41,9 +41,19 @@ class Question(NamedTuple):
     base: Fit
     block: np.ndarray
     structure: AbstractTerm
-    field: Field
+    fields: tuple[Field, ...]
     delay: float
-    reversals: bool = False
+    within: "Question | None" = None
+
+    @property
+    def reversals(self) -> bool:
+        """Whether rows reach across reversals, where the axis moves instead of sticking."""
+        return self.within is not None
+
+    @property
+    def field(self) -> Field:
+        """The candidates, with their columns."""
+        return self.fields[0]
 
     @property
     def wider(self) -> Wider:
@@ -66,10 +76,10 @@ def ask(
     motion = from_position(recording)
     evidence = gather(motion)
     if before is not None:
-        return _aligned(motion, evidence, holdout, structure, known, before.field)
+        return _aligned(motion, evidence, holdout, structure, known, before.fields)
     field = Field(evidence, structure)
     try:
-        asked = _aligned(motion, evidence, holdout, structure, known, field)
+        asked = _aligned(motion, evidence, holdout, structure, known, (field,))
     except BaseException:
         field.close()
         raise
@@ -78,7 +88,23 @@ def ask(
     return asked
 
 
-def _aligned(motion, evidence: Evidence, holdout, structure, known, field: Field) -> Question:
+def opened(recording: Recording, holdout: Recording | None, asked: Question) -> Question | None:
+    """The question with rows across reversals too, where the axis moves there instead of sticking.
+
+    `None` where it sticks.
+    """
+    motion, width, delay = from_position(recording), asked.evidence.width, asked.delay
+    if not yields(motion, asked.evidence, asked.base):
+        return None
+    evidence = gather(motion, width, delay, True)
+    wide = _wider(motion, evidence, delay, True)
+    question = _put(
+        motion, evidence, wide, holdout, asked.structure, asked.base, asked.fields, delay, True
+    )
+    return question._replace(within=asked)
+
+
+def _aligned(motion, evidence: Evidence, holdout, structure, known, fields) -> Question:
     wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
     known = fit([structure], evidence) if known is None else known
     # To first order a delay is a column; the first estimate is good to a fifth of a sample.
@@ -91,19 +117,21 @@ def _aligned(motion, evidence: Evidence, holdout, structure, known, field: Field
         wide = None if wide is None else gather(motion, wide.width, delay)
         if abs(delay - last) < 0.5 * ALIGNED * sample:
             break
-    across = yields(motion, evidence, known)
-    if across:
-        evidence = gather(motion, evidence.width, delay, across)
-        wide = _wider(motion, evidence, delay, across)
+    return _put(motion, evidence, wide, holdout, structure, known, fields, delay, False)
+
+
+def _put(
+    motion, evidence: Evidence, wide, holdout, structure, known: Fit, fields, delay, across
+) -> Question:
     held = None
     if holdout is not None:
         held = gather(from_position(holdout), evidence.width, delay, across)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    if not field.serves(evidence):
-        field = Field(evidence, structure)
+    field = next((f for f in fields if f.serves(evidence)), None) or Field(evidence, structure)
+    kept = (field, *(f for f in fields if f is not field))
     between = _wider(motion, evidence, delay, across, BETWEEN)
-    return Question(evidence, wide, between, held, base, block, structure, field, delay, across)
+    return Question(evidence, wide, between, held, base, block, structure, kept, delay)
 
 
 def _wider(

@@ -44,6 +44,13 @@ class Fit(NamedTuple):
         """An orthonormal basis of the Jacobian's span, `(J, r)`."""
         return orthonormal(self.jacobian)
 
+    def only(self, places: Sequence[int]) -> "Fit":
+        """The terms of those places with their parameters; whatever else is still of them all."""
+        terms, betas, alphas = (
+            tuple(values[i] for i in places) for values in (self.terms, self.betas, self.alphas)
+        )
+        return self._replace(terms=terms, betas=betas, alphas=alphas)
+
     def part(self, number: int) -> np.ndarray:
         """The force of one of the terms, `(J,)`."""
         counts = np.cumsum([0, *(len(a) for a in self.alphas)])

@@ -57,13 +57,8 @@ def wavelike(now: Fit, number: int) -> bool:
 
 def lasting(now: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
     """A fit without the terms that say nothing of another recording; only its terms and β count."""
-    keep = [
-        i for i, t in enumerate(now.terms) if i not in rephased and not isinstance(t, _MOMENTARY)
-    ]
-    return now._replace(
-        terms=tuple(now.terms[i] for i in keep),
-        betas=tuple(now.betas[i] for i in keep),
-        alphas=tuple(now.alphas[i] for i in keep),
+    return now.only(
+        [i for i, t in enumerate(now.terms) if i not in rephased and not isinstance(t, _MOMENTARY)]
     )
 
 
