@@ -92,7 +92,8 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     box = term_bounds(
         active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
     )
-    beta, converged, border = search(active, recording, rows, box, grid)
+    alike = not any(name.endswith(("+", "-")) for name, _ in given)
+    beta, converged, border = search(active, recording, rows, box, grid, alike)
     alpha, jacobian, error = _solve(active, beta, recording, rows)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)

@@ -37,18 +37,24 @@ def _sides(term: AbstractTerm):
 
 
 def search(
-    term: AbstractTerm, recording: Recording, rows: Rows, box: Float[Array, "2 d"], grid: int | None
+    term: AbstractTerm,
+    recording: Recording,
+    rows: Rows,
+    box: Float[Array, "2 d"],
+    grid: int | None,
+    alike: bool = False,
 ) -> Found:
     """β of the least reduced cost L(β) (Kim, Kim & Ha 2004, eq. 17) inside the bounds `box`.
 
     **Arguments:** `term`, `recording` (prepared), `rows`, its rows; `box`, lower and upper bounds
-    `(2, d)`; `grid`, points a side, or `None` for a default.
+    `(2, d)`; `grid`, points a side, or `None` for a default; `alike`, whether the bounds of both
+    directions are known to be the same, so that the grid of one serves both.
     """
     if not term.nonlinear:
         yes = jnp.ones((), bool)
         return Found(jnp.zeros((0,), rows.target.dtype), yes, ~yes)
     logarithmic = tuple(p.logarithmic for p in term.nonlinear)
-    problem = _Problem(term, recording, rows, box, logarithmic)
+    problem = _Problem(term, recording, rows, box, logarithmic, alike)
     frozen = jax.lax.stop_gradient(problem)
     sides = _sides(term)
     best = _grid_whole(frozen, grid) if sides is None else _grid_sides(sides, frozen, grid)
@@ -79,6 +85,7 @@ class _Problem(eqx.Module):
     rows: Rows
     box: Float[Array, "2 d"]
     logarithmic: tuple[bool, ...] = eqx.field(static=True)
+    alike: bool = eqx.field(static=True)
 
     def columns(self, term: AbstractTerm, unit, box=None) -> Float[Array, "J k"]:
         """The rows of the nonlinear columns of a term at a point of the unit cube, or of `box`."""
@@ -219,7 +226,8 @@ def _grid_sides(sides, problem: _Problem, points):
             return rows.columns(bumps.with_beta(beta), recording)[:, 0]
 
         logarithmic = problem.logarithmic[:count]
-        costs = Sides(values, rows.time, moments, problem.boxes, logarithmic).costs(grid)
+        both = Sides(values, rows.time, moments, problem.boxes, logarithmic, problem.alike)
+        costs = both.costs(grid)
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
     return _Best(starts.reshape(-1), cells.reshape(-1), *(() if shared else exact))
@@ -245,7 +253,7 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
 
     def sides(places, moments):
         logarithmic = problem.logarithmic[: grid.shape[1]]
-        return Sides(contrast, places, moments, problem.boxes, logarithmic)
+        return Sides(contrast, places, moments, problem.boxes, logarithmic, problem.alike)
 
     if _straight(linear) and grid.shape[0] >= compress.LEAST_POINTS:
         # The first nonlinear parameter of a bump is its width.

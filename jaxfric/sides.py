@@ -12,7 +12,7 @@ from . import compress, reduced
 
 class Sides(NamedTuple):
     """One bump as a function of β and places, the places of the moments, and each direction's
-    bounds of β, `(2, 2, d)`.
+    bounds of β, `(2, 2, d)`; `alike`: whether these are known to be the same.
     """
 
     bump: Callable[[Float[Array, " d"], Float[Array, " J"]], Float[Array, " J"]]
@@ -20,6 +20,7 @@ class Sides(NamedTuple):
     moments: reduced.Moments
     boxes: Float[Array, "2 2 d"]
     logarithmic: tuple[bool, ...]
+    alike: bool = False
 
     def at(self, unit: Float[Array, " d"], box: Float[Array, "2 d"]) -> Float[Array, " J"]:
         """The bump at a point of one direction's unit cube."""
@@ -27,6 +28,8 @@ class Sides(NamedTuple):
 
     def costs(self, grid: Float[Array, "G d"]) -> Float[Array, "2 G"]:
         """The cost of each direction over its own bounds."""
+        if self.alike:  # the bumps of one serve both
+            return reduced.grid_costs(lambda unit: self.at(unit, self.boxes[0]), grid, self.moments)
 
         def side(rows, box):
             return reduced.grid_costs(lambda unit: self.at(unit, box), grid, rows)[0]

@@ -290,6 +290,8 @@ def test_each_direction_is_searched_inside_its_own_bounds(points):
     friction, bare, rows, *_ = problem("gaussian", 0.02)
     wide, odd = ([[0.002, low], [0.1, high]] for low, high in ((0.002, 0.1), (0.011, 0.3)))
     same = search(friction, bare, rows, jnp.asarray(wide), points)
+    once = search(friction, bare, rows, jnp.asarray(wide), points, alike=True)
+    np.testing.assert_allclose(once.beta, same.beta, rtol=1e-12)
     other = search(friction, bare, rows, jnp.asarray(odd), points)
     assert not bool(other.on_border)
     np.testing.assert_allclose(other.beta, same.beta, rtol=1e-9)
