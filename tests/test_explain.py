@@ -215,6 +215,7 @@ def test_a_late_force_is_a_delay_and_nothing_else(healthy):
     assert float(delay.value) == pytest.approx(6e-3, abs=1.1e-3)
 
 
+@pytest.mark.slow
 def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
     gaussian = models.named("gaussian")
 
@@ -523,6 +524,15 @@ def test_what_was_refuted_is_not_named_again(healthy):
         [taken.trial.candidate.effect.name for taken in found.taken] for found in (plain, other)
     ]
     assert names[0] == ["cogging"] and "cogging" not in names[1]
+    # A form of its law that was refuted may give way to another of the same effect.
+    candidate = plain.taken[0].trial.candidate
+    nothing = plain._replace(taken=[])
+    forms, effects = explaining._refuted(plain, nothing, asked)
+    assert effects == {"cogging"} == naming.marks(candidate) - forms and len(forms) == 1
+    again = naming.search(asked.evidence, asked.base, asked.field, refuted=forms)
+    other = again.taken[0].trial.candidate
+    assert other.effect is candidate.effect and not naming.marks(other) & forms
+    assert not list(explaining._refuted(plain, plain, asked))
 
 
 def test_a_dead_band_is_crossed_when_the_command_crosses():

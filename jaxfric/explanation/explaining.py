@@ -1,6 +1,7 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
 import dataclasses
+from collections.abc import Hashable, Iterator
 
 import equinox as eqx
 import jax
@@ -17,7 +18,7 @@ from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import LEAST_OF_BASE, Named, search
+from .naming import LEAST_OF_BASE, Named, marks, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
@@ -130,20 +131,28 @@ def _as_given(known: Baseline, asked: Question, seed) -> tuple[Question, Named]:
 def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
     """The question and the findings that hold on the held-out recording.
 
-    Where one did not, another may account for the same here and hold there: it is looked for, once.
-    `before`: a question about the same motion.
+    Where one did not, another may account for the same here and hold there: another form of its
+    law, which is looked for first, or another effect. `before`: a question about the same motion.
     """
     asked, first = pursue(recording, holdout, structure, seed, before)
     _check_signals(first, recording, holdout)
     found = _verified(first, asked, seed)
-    refuted = _names(first) - _names(found)
-    if not refuted:
-        return asked, found
-    again = _sought(asked, seed, refuted, first.start)
-    _check_signals(again, recording, holdout)
-    again = _verified(again, asked, seed)
-    nearer = _names(again) > _names(found) and _error(again, asked) < _error(found, asked)
-    return asked, again if nearer else found
+    for refuted in _refuted(first, found, asked):
+        again = _sought(asked, seed, refuted, first.start)
+        _check_signals(again, recording, holdout)
+        again = _verified(again, asked, seed)
+        if _names(again) > _names(found) and _error(again, asked) < _error(found, asked):
+            return asked, again
+    return asked, found
+
+
+def _refuted(first: Named, found: Named, asked: Question) -> Iterator[frozenset[Hashable]]:
+    """Marks of what of the first findings is not among those that hold: its forms, its effects."""
+    names = _names(first) - _names(found)
+    gone = [t.trial.candidate for t in first.taken if t.trial.candidate.effect.name in names]
+    forms = frozenset[Hashable]().union(*map(marks, gone)) - names
+    others = [c for c in asked.field.candidates if c.effect.name in names and not marks(c) & forms]
+    yield from [forms] * bool(others) + [names] * bool(names)
 
 
 def _check_signals(found: Named, recording, holdout) -> None:
@@ -188,7 +197,7 @@ def _searched(recording, holdout, asked: Question, seed) -> tuple[Question, Name
     return (asked, found) if across is None else (across, _sought(across, seed, start=found))
 
 
-def _sought(asked: Question, seed, refuted: frozenset[str] = frozenset(), start=None) -> Named:
+def _sought(asked: Question, seed, refuted: frozenset[Hashable] = frozenset(), start=None) -> Named:
     return search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start)
 
 

@@ -1,13 +1,14 @@
 """Which physics the residual calls for: the winner of a contest joins, and all are refitted."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from ..catalogue import Effect
 from ..terms import Compliance, DryCompliance, ElasticBacklash
-from .candidates import Field
+from .candidates import Candidate, Field
 from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
 from .evidence import Evidence
@@ -65,15 +66,16 @@ def search(
     field: Field,
     wider: Wider = (None, None),
     seed: int = 0,
-    refuted: frozenset[str] = frozenset(),
+    refuted: frozenset[Hashable] = frozenset(),
     start: Named | None = None,
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
     **Arguments:** `field`: the candidates; `wider`: the recording through wider kernels, where
-    terms that act on derivatives of the force must show alike; `refuted`: effects that are out of
-    question; `start`: what the rows without reversals have shown, where these reach across them.
-    Then only what acts there is looked for: all else has been, where nothing of that hides it.
+    terms that act on derivatives of the force must show alike; `refuted`: [`marks`][] of what is
+    out of question; `start`: what the rows without reversals have shown, where these reach across
+    them. Then only what acts there is looked for: all else has been, where nothing of that hides
+    it.
     """
     now, taken, among, kept = base, list[Taken](), frozenset[str](), 0
     evidence = with_predictions(evidence, now)
@@ -89,7 +91,7 @@ def search(
         machines = [
             f
             for f in round_.finalists
-            if f.trial.candidate.effect.name not in refuted and plausible(f, now, evidence)
+            if not marks(f.trial.candidate) & refuted and plausible(f, now, evidence)
         ]
         round_ = round_._replace(finalists=machines)
         best = _believed(round_, now, evidence, wider, base, taken)
@@ -201,9 +203,9 @@ EASY = frozenset(
 # dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
 REVERSAL_OF_BASE = 0.25
-# None of these floors is for what takes nine tenths of what is left: what an idealisation leaves is
-# not of one law's shape; on machines with one effect a second name took two thirds of it at most.
-NEARLY_ALL = 0.9
+# None of these floors is for what takes three quarters of what is left: what an idealisation leaves
+# is not of one law's shape; on machines with one effect a second name took two thirds at most.
+NEARLY_ALL = 0.75
 
 
 def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken]):
@@ -290,10 +292,15 @@ def _alike(finalist: Finalist, now: Fit, wide: Evidence, factor: float, least: f
     return positive and 1 / factor < ratio < factor and enough
 
 
-def _elsewhere(found: Named, refuted: frozenset[str]) -> tuple[Fit, list[Taken]]:
+def marks(candidate: Candidate) -> frozenset[Hashable]:
+    """By what a candidate may be out of question: as its effect, or as this form of its law."""
+    return frozenset({candidate.effect.name, jax.tree.structure(candidate.term)})
+
+
+def _elsewhere(found: Named, refuted: frozenset[Hashable]) -> tuple[Fit, list[Taken]]:
     """What was found but for what acts at reversals or is out of question."""
     gone, start = AT_REVERSALS | refuted, len(found.last.terms) - len(found.taken)
-    kept = [i for i, t in enumerate(found.taken) if t.trial.candidate.effect.name not in gone]
+    kept = [i for i, t in enumerate(found.taken) if not marks(t.trial.candidate) & gone]
     last = found.last.only([*range(start), *(start + i for i in kept)])
     return last, [found.taken[i] for i in kept]
 
