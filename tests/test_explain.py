@@ -619,3 +619,19 @@ def test_findings_bring_a_model_nearer_to_the_held_out_recording(healthy, monkey
     ]
     kept = found._replace(taken=momentary)
     assert explaining._verified(kept, asked, 0) is kept
+
+
+def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch):
+    base, less, more = (types.SimpleNamespace(energy=e) for e in (1000.0, 3.0, 1.8))
+    found = types.SimpleNamespace(base=base, last=more, taken=[0, 0])
+    asked = types.SimpleNamespace(held=None)
+    parts = {}
+    monkeypatch.setattr(verification, "helps", lambda *_: True)
+    monkeypatch.setattr(verification, "share", lambda less, more, first, *_: parts[first.energy])
+    for left, of_rest, holds in ((1.8, 0.2, False), (1.8, 0.3, True), (1.2, 0.2, True)):
+        more.energy, parts[1000.0], parts[3.0] = left, 0.001, of_rest
+        assert explaining._holds(less, found, asked, frozenset()) is holds
+    # And the search lets in a third of the rest only where that will be asked.
+    effects = EFFECTS["spring"], [EFFECTS["cogging"]]
+    for most, least in ((naming.MOST, 1.5), (naming.MOST_JUDGED, 1.0)):
+        assert naming.least_gain(*effects, 1000.0, 3.0, most) == pytest.approx(least)

@@ -18,7 +18,7 @@ from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import LEAST_OF_BASE, Named, marks, search
+from .naming import LEAST_OF_BASE, MOST, MOST_JUDGED, OF_BASE, Named, marks, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
@@ -198,7 +198,8 @@ def _searched(recording, holdout, asked: Question, seed) -> tuple[Question, Name
 
 
 def _sought(asked: Question, seed, refuted: frozenset[Hashable] = frozenset(), start=None) -> Named:
-    return search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start)
+    most = MOST if asked.held is None else MOST_JUDGED
+    return search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start, most)
 
 
 def _verified(found: Named, asked: Question, seed) -> Named:
@@ -249,7 +250,8 @@ def _error(found: Named, asked: Question) -> float:
 
 # On the held-out recording a later term has to take the least part of the baseline's mismatch that
 # it may take here, since another motion excites another effect more; or a quarter of what the
-# others leave there, with nothing refitted: what another law leaves does not repeat so well.
+# others leave there, with nothing refitted: what another law leaves does not repeat so well. That
+# is asked of what takes neither 1 % of the baseline's mismatch nor half of the rest here.
 GOOD_PART = 0.25
 
 
@@ -263,4 +265,6 @@ def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -
     def part(first: Fit) -> float:
         return verification.share(less, found.last, first, asked.held, rephased)
 
-    return part(found.base) >= LEAST_OF_BASE or part(less) >= GOOD_PART
+    enough = min(OF_BASE * found.base.energy, MOST * less.energy)
+    weak = less.energy - found.last.energy < enough
+    return (part(found.base) >= LEAST_OF_BASE and not weak) or part(less) >= GOOD_PART
