@@ -290,14 +290,21 @@ def test_each_direction_is_searched_inside_its_own_bounds(points):
     friction, bare, rows, *_ = problem("gaussian", 0.02)
     wide, odd = ([[0.002, low], [0.1, high]] for low, high in ((0.002, 0.1), (0.011, 0.3)))
     same = search(friction, bare, rows, jnp.asarray(wide), points)
-    once = search(friction, bare, rows, jnp.asarray(wide), points, alike=True)
-    np.testing.assert_allclose(once.beta, same.beta, rtol=1e-12)
     other = search(friction, bare, rows, jnp.asarray(odd), points)
     assert not bool(other.on_border)
     np.testing.assert_allclose(other.beta, same.beta, rtol=1e-9)
     held = search(friction, bare, rows, jnp.asarray([[0.002, 0.03], [0.1, 0.3]]), points)
     assert bool(held.on_border)
     np.testing.assert_allclose(held.beta, [same.beta[0], 0.03], rtol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("points", [None, 64])
+def test_the_bumps_of_one_direction_serve_both(points):
+    friction, bare, rows, *_ = problem("gaussian", 0.02)
+    box = jnp.asarray([[0.002, 0.002], [0.1, 0.1]])
+    apart, once = (search(friction, bare, rows, box, points, alike) for alike in (False, True))
+    np.testing.assert_allclose(once.beta, apart.beta, rtol=1e-12)
 
 
 quickly = functools.partial(jax.jit, compiler_options=quick_options())
