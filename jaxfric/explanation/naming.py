@@ -109,6 +109,7 @@ def search(
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
             if start is not None and len(taken) == kept:
+                # Nothing there has a name, and the base fits these rows as well as it can.
                 betas = (base.betas[0], *now.betas[1:])
                 now = fit(now.terms, evidence, betas, 6) if taken else base
             return Named(base, now, taken, round_, start=start)
