@@ -92,6 +92,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     box = term_bounds(
         active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
     )
+    # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
     beta, converged, border = search(active, recording, rows, box, grid, alike)
     alpha, jacobian, error = _solve(active, beta, recording, rows)

@@ -633,5 +633,5 @@ def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch
         assert explaining._holds(less, found, asked, frozenset()) is holds
     # And the search lets in a third of the rest only where that will be asked.
     effects = EFFECTS["spring"], [EFFECTS["cogging"]]
-    for most, least in ((naming.MOST, 1.5), (naming.MOST_JUDGED, 1.0)):
-        assert naming.least_gain(*effects, 1000.0, 3.0, most) == pytest.approx(least)
+    for judged, least in ((False, 1.5), (True, 1.0)):
+        assert naming.least_gain(*effects, 1000.0, 3.0, judged) == pytest.approx(least)

@@ -18,7 +18,7 @@ from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import LEAST_OF_BASE, MOST, MOST_JUDGED, OF_BASE, Named, marks, search
+from .naming import LEAST_OF_BASE, MOST, OF_BASE, Named, marks, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
@@ -147,12 +147,15 @@ def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question,
 
 
 def _refuted(first: Named, found: Named, asked: Question) -> Iterator[frozenset[Hashable]]:
-    """Marks of what of the first findings is not among those that hold: its forms, its effects."""
+    """Marks of what did not hold of the first: its forms, where others are; its effects."""
     names = _names(first) - _names(found)
     gone = [t.trial.candidate for t in first.taken if t.trial.candidate.effect.name in names]
     forms = frozenset[Hashable]().union(*map(marks, gone)) - names
     others = [c for c in asked.field.candidates if c.effect.name in names and not marks(c) & forms]
-    yield from [forms] * bool(others) + [names] * bool(names)
+    if others:
+        yield forms
+    if names:
+        yield names
 
 
 def _check_signals(found: Named, recording, holdout) -> None:
@@ -198,8 +201,10 @@ def _searched(recording, holdout, asked: Question, seed) -> tuple[Question, Name
 
 
 def _sought(asked: Question, seed, refuted: frozenset[Hashable] = frozenset(), start=None) -> Named:
-    most = MOST if asked.held is None else MOST_JUDGED
-    return search(asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start, most)
+    judged = asked.held is not None
+    return search(
+        asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start, judged
+    )
 
 
 def _verified(found: Named, asked: Question, seed) -> Named:

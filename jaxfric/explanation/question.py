@@ -85,6 +85,7 @@ def ask(
         raise
     if asked.field is not field:
         field.close()
+        asked = asked._replace(fields=asked.fields[:1])
     return asked
 
 

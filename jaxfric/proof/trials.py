@@ -15,7 +15,7 @@ from ..documents import to_json
 from ..explanation import Explanation, explain
 from ..explanation.evidence import gather
 from ..explanation.forward import motion_error
-from ..explanation.question import ask, from_position
+from ..explanation.question import ask, from_position, opened
 from ..explanation.verification import residual
 from ..io import write_text
 from ..models import named
@@ -129,9 +129,13 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
         {name: force for name, force in hidden.items() if name != unknown}
         for hidden in (run.hidden, run.hidden_holdout)
     )
-    known = ask(_without(run.recording, first), _without(run.holdout, second), structure)
-    known.field.close()  # nobody asks for the candidates' columns
-    measured = gather(from_position(run.holdout), known.evidence.width, known.delay).target
+    run_less, holdout_less = _without(run.recording, first), _without(run.holdout, second)
+    asked = ask(run_less, holdout_less, structure)
+    known = opened(run_less, holdout_less, asked) or asked
+    for field in known.fields:
+        field.close()  # nobody asks for the candidates' columns
+    rows = known.evidence.width, known.delay, known.reversals
+    measured = gather(from_position(run.holdout), *rows).target
     return _norm(residual(known.base, known.held)) / _norm(measured)
 
 
