@@ -28,6 +28,7 @@ from jaxfric.explanation import (
     regression,
     telling,
     timing,
+    tones,
     verification,
 )
 from jaxfric.explanation.sentences import sentence
@@ -283,14 +284,63 @@ def test_blocks_that_disagree_are_chance():
     assert chance.agreement(either[None], block, 0) > 0.1
 
 
-def test_what_the_motion_has_is_no_tone(healthy):
+def tones_to_try(seen):
+    """The tones to try that the motion does not have, and those that it has."""
+    frequencies = candidates.line_frequencies(seen, "time")
+    effect, term = EFFECTS["periodic_disturbance"], terms.PeriodicDisturbance()
+    found = {c.least: c.betas[:, 0] for c in candidates._tones(effect, term, frequencies, seen)}
+    assert sum(map(len, found.values())) <= len(frequencies)
+    return found[0.0], found.get(candidates.ALL, np.zeros(0)), frequencies[1] - frequencies[0]
+
+
+def test_what_the_motion_has_is_no_tone_but_alone(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
-    tones = candidates.line_frequencies(seen, "time")
-    kept = candidates._foreign(tones, seen)
+    foreign, own, step = tones_to_try(seen)
     rates = 0.7 * (1 + np.random.default_rng(0).uniform(0, 2.5, 5))
     for rate in rates:
-        assert np.min(np.abs(kept - rate)) > 0.25 * (tones[1] - tones[0])
-    assert len(kept) > 0.8 * len(tones)
+        assert np.min(np.abs(foreign - rate)) > 0.25 * step
+        assert np.min(np.abs(own - rate)) < step
+    assert len(foreign) > 0.8 * (len(foreign) + len(own))
+    # Of a motion that is one wave neither that nor its multiples.
+    wave = np.sin(2 * np.pi * 1.03 * TIME)
+    seen = evidence.gather(Recording(TIME, wave, 0.1 * wave, None))
+    foreign, own, step = tones_to_try(seen)
+    for multiple in (1.03, 2.06):
+        assert np.min(np.abs(np.concatenate([foreign, own]) - multiple)) > 3 * step
+    assert np.any(np.abs(own - 1.03) < 8 * step)
+
+
+def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
+    rates, tone = 0.7 * (1 + np.random.default_rng(0).uniform(0, 2.5, 5)), "periodic_disturbance"
+
+    def named(run):
+        asked = question.ask(run, None, models.named("gaussian"))
+        mine = [c for c in asked.field.candidates if c.effect.name == tone]
+        asked.field.candidates = mine
+        return naming.search(asked.evidence, asked.base, asked.field).taken
+
+    alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
+    (found,) = named(alone)
+    assert found.trial.candidate.least == candidates.ALL
+    assert found.trial.beta[0] == pytest.approx(rates[0], rel=0.01)
+    # With a second like it the motion may drive both.
+    assert not named(planted(alone, terms.PeriodicDisturbance(), (1.0, 1.5), (rates[4],)))
+
+
+def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeypatch):
+    structure = models.named("gaussian")
+    run = planted(healthy[0], terms.PeriodicDisturbance(), (0.3, 0.4), (31.37,))
+    asked = question.ask(run, None, structure)
+    monkeypatch.setattr(tones, "line_frequencies", lambda *_: np.array([5.0, 20.0]))
+    (found,) = tones.fast_tone(asked.evidence, asked.base)
+    assert np.min(np.abs(found.betas[:, 0] - 31.37)) < 0.02
+    assert found.least == 0.0
+    # Noise has none, and what a fit leaves of a tone that it knows has none at that place.
+    quiet = question.ask(healthy[0], None, structure)
+    assert not tones.fast_tone(quiet.evidence, quiet.base)
+    known = (terms.PeriodicDisturbance(), np.array([31.37]))
+    both = regression.fit([structure, known[0]], asked.evidence, [asked.base.betas[0], known[1]], 2)
+    assert not tones.fast_tone(asked.evidence, both)
 
 
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
@@ -352,6 +402,28 @@ def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
     load, beta = finalist(LOAD)
     load.betas = (*asked.base.betas, beta)
     assert plausible.plausible(load, asked.base, asked.evidence) is is_one
+
+
+def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
+    asked = question.ask(healthy[0], None, models.named("gaussian"))
+    term, trial = terms.ElasticBacklash(), types.SimpleNamespace(threshold=0.1)
+    trial.score, trial.candidate = (lambda gain, _: 100 * gain), types.SimpleNamespace(term=term)
+    # Friction of 8 N that coasts at 1 m/s² belongs to 8 kg; the machine has 5.
+    for friction, coasting, kept in ((8.0, 4.0, 4.0), (8.0, 1.0, 1.6), (80.0, 10.0, None)):
+        beta = np.array([2e-4, 1e-4, coasting])
+        force = evidence.Evidence.columns(asked.evidence, term, beta[None])[0] @ [friction]
+        seen = asked.evidence._replace(target=asked.evidence.target + force)
+        now = regression.fit([asked.structure], seen, asked.base.betas[:1], 0)
+        found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, (*now.betas, beta), None)
+        round_ = plausible.machines(contest.Contest([], [found], 100.0), now, seen)
+        if kept is None:
+            assert not round_.finalists
+            continue
+        (machine,) = round_.finalists
+        assert machine.betas[-1][2] == pytest.approx(kept, rel=0.1)
+        assert (machine is found) is (kept == coasting)
+        if machine is not found:
+            assert machine.energy > 0 and machine.score < 100.0
 
 
 def test_what_lags_is_a_curve_that_is_there(healthy):

@@ -31,12 +31,16 @@ OF_THE_MOMENT = frozenset(
 
 
 class Candidate(NamedTuple):
-    """A term of an effect, and the places of β to try: `betas`, `(G, d)`."""
+    """A term of an effect, and the places of β to try: `betas`, `(G, d)`.
+
+    `lines`: how its waves are computed; `least`: the part of what is left that it must take.
+    """
 
     effect: Effect
     term: AbstractTerm
     betas: np.ndarray
     lines: "Lines | None" = None
+    least: float = 0.0
 
     def columns(self, evidence: Evidence) -> np.ndarray:
         """The rows of its columns at every place, `(G, J, k)`."""
@@ -208,9 +212,7 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
             periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
         yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))
     elif kind is laws.PeriodicDisturbance:
-        tones = _foreign(line_frequencies(evidence, "time"), evidence)
-        if len(tones):
-            yield Candidate(effect, term, tones[:, None], Lines("time", False))
+        yield from _tones(effect, term, line_frequencies(evidence, "time"), evidence)
     elif kind is laws.StickySpot:
         yield Candidate(effect, term, _spots(evidence))
     elif kind is laws.Compliance:
@@ -246,10 +248,27 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
 # Part of the motion's variance in a tone's resolution cell from which the tone is the motion's own:
 # an unrelated one holds two of some thousand values.
 OWN = 0.05
+# What the motion drives is in all of its tones or, where it is one wave, in that and its multiples.
+# But a force that is all in another one, or in one of many, has a clock of its own.
+ITSELF, ALL = 0.5, 0.9
 
 
-def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
-    """The tones that the motion does not have: what repeats with it need not be driven by time."""
+def _tones(effect: Effect, term: AbstractTerm, tones: np.ndarray, evidence) -> Iterator[Candidate]:
+    """Those that the motion does not have, and those that it has but need not drive."""
+    power = shared(tones, evidence)
+    own = power >= OWN
+    if np.any(~own):
+        yield Candidate(effect, term, tones[~own, None], Lines("time", False))
+    if power.max() >= ITSELF:
+        lowest = int(np.argmax(power >= ITSELF))
+        wave = tones[lowest + int(np.argmax(power[lowest : lowest + OVERSAMPLING]))]
+        own &= np.abs(tones - wave * np.round(tones / wave)) > OVERSAMPLING * np.diff(tones[:2])
+    if np.any(own):
+        yield Candidate(effect, term, tones[own, None], Lines("time", False), ALL)
+
+
+def shared(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
+    """The part of the motion's variance in the cell of each tone: the largest of its signals'."""
     motion, rows = evidence.motion, evidence.centre
     time, velocity = np.asarray(motion.time)[rows], np.asarray(motion.velocity)[rows]
     signals = [velocity, np.abs(velocity), evidence.side]
@@ -262,7 +281,7 @@ def _foreign(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
         angle = _angle(tones[some : some + _AT_ONCE, None] * (time - time[0]))
         both = (series @ np.stack([np.sin(angle), np.cos(angle)]).transpose(0, 2, 1)) ** 2
         power[some : some + _AT_ONCE] = np.max(np.sum(both, axis=0), axis=0) * 2 / len(time)
-    return tones[power < OWN]
+    return power
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.

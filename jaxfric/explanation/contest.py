@@ -11,6 +11,7 @@ from .evidence import Evidence
 from .pulses import pulses
 from .regression import Fit, fit
 from .threads import each
+from .tones import fast_tone
 
 # A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
 # 1995 call ten on twice this scale very strong).
@@ -107,9 +108,10 @@ def contest(
         )
     ]
     known = any(isinstance(term, DisturbancePulses) for term in now.terms)
-    for candidate in [] if known else pulses(seen, now):
+    for candidate in [*([] if known else pulses(seen, now)), *fast_tone(seen, now)]:
         raw = scaled(candidate.columns(seen))
-        # Signs of blocks say nothing about single events: what stands out has been tested.
+        # Signs of blocks say nothing about single events, nor about a line among thousands: what
+        # stands out has been tested.
         scan = judge(raw)
         own = raw[scan.best : scan.best + 1]
         trials.append(_trial(judge, candidate, own, scan, 1 / (1 + DRAWS), np.inf))

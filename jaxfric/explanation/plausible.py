@@ -5,11 +5,52 @@ import numpy as np
 from .. import terms as laws
 from ..terms.friction import AbstractBump
 from .candidates import leaves
-from .contest import Finalist
+from .contest import Contest, Finalist
 from .evidence import Evidence
 from .regression import Fit, fit
 
 _LOADS = laws.Compliance | laws.DryCompliance | laws.ElasticBacklash
+# Of a load behind a gap the rows tell the friction well, and the inertia only by how it coasts;
+# where they ask for somewhat more of that than there is, they are asked about all there is.
+TRIES = 3
+
+
+def machines(round_: Contest, now: Fit, evidence: Evidence) -> Contest:
+    """The finalists that are parts of a machine, the best first: as they are, or the nearest."""
+    found = []
+    for finalist in round_.finalists:
+        for _ in range(TRIES):
+            if plausible(finalist, now, evidence):
+                found.append(finalist)
+                break
+            lighter = _lighter(finalist, now, evidence, round_.size)
+            if lighter is None:
+                break
+            finalist = lighter
+    return round_._replace(finalists=sorted(found, key=lambda each: -each.score))
+
+
+def _lighter(finalist: Finalist, now: Fit, evidence: Evidence, size: float) -> Finalist | None:
+    """A load behind a gap with no more inertia than the machine has, its friction fitted again.
+
+    `None` for any other, and where it is the friction that is too much.
+    """
+    trial = finalist.trial
+    if not isinstance(trial.candidate.term, laws.ElasticBacklash):
+        return None
+    inertia, friction, most = _beside(finalist, now, evidence)
+    if friction > most["coulomb"] + most["stribeck_force"] or not 0 < most["inertia"] < inertia:
+        return None
+    beta = finalist.betas[-1] * np.array([1.0, 1.0, 1.01 * inertia / most["inertia"]])
+    there = fit([trial.candidate.term], evidence, [beta], 0, now.basis())
+    gain = 1 - there.energy / now.energy
+    return finalist._replace(
+        score=trial.score(gain, size),
+        p_value=finalist.p_value if gain > trial.threshold else 1.0,
+        energy=there.energy,
+        betas=(*finalist.betas[:-1], there.betas[0]),
+        alpha=there.alphas[0],
+    )
 
 
 def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
@@ -31,6 +72,13 @@ def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
         give = slow / (2 * np.pi * resonance) ** 2
         if give > 0.1 * (evidence.limits.high - evidence.limits.low):
             return False
+    inertia, friction, most = _beside(finalist, now, evidence)
+    return inertia <= most["inertia"] and friction <= most["coulomb"] + most["stribeck_force"]
+
+
+def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[float, float, dict]:
+    """Inertia, kg, and friction, N, of the load or the bump, and what the machine has of each."""
+    term = finalist.trial.candidate.term
     both = fit((*now.terms, term), evidence, finalist.betas, 0)
     inertia, friction = _parts(term, both.betas[-1], both.alphas[-1])
     values = [
@@ -42,7 +90,7 @@ def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
         name: max((a for n, a in values if n == name), default=default)
         for name, default in (("inertia", np.inf), ("coulomb", np.inf), ("stribeck_force", 0.0))
     }
-    return inertia <= most["inertia"] and friction <= most["coulomb"] + most["stribeck_force"]
+    return inertia, friction, most
 
 
 def _parts(term, beta, alpha) -> tuple[float, float]:

@@ -126,16 +126,17 @@ def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
 # part; of four times its size, sixteen times the power, something is missing, wherever.
 ROUGH = 4.0
-# Where the findings leave most of the mismatch, less will do.
-HALF_ROUGH = 1.5
+# Where the findings leave half of the mismatch's size, a quarter of its power, less will do: more
+# than half as much again as that noise in power.
+HALF_ROUGH, QUARTER = 1.25, 0.25
 
 
 def _rough(asked: Question, found: Named, base: Fit) -> bool:
-    """Whether what is left is far from the noise that neighbouring rows show, or most of it all."""
+    """Whether what is left is far from the noise that neighbouring rows show, or much of it all."""
     error = verification.error(found.last, asked.evidence)
     floor = verification.noise(found.last, asked.evidence.target)
-    most = found.last is not base and found.last.energy > 0.5 * base.energy
-    return error > (HALF_ROUGH if most else ROUGH) * floor and error > LINEARITY
+    much = found.last is not base and found.last.energy > QUARTER * base.energy
+    return error > (HALF_ROUGH if much else ROUGH) * floor and error > LINEARITY
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
