@@ -18,7 +18,7 @@ from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
 from .forward import motion_error
-from .naming import LEAST_OF_BASE, MOST, OF_BASE, Named, marks, search
+from .naming import LEAST_OF_BASE, LINEARITY, MOST, OF_BASE, Named, marks, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
@@ -264,12 +264,13 @@ def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -
     """Whether what `less` lacks helps on the held-out recording; beside others, by how much."""
     if not verification.helps(less, found.last, asked.held, rephased):
         return False
-    if len(found.taken) == 1:
+    gained, target = less.energy - found.last.energy, asked.evidence.target
+    faint = gained < LINEARITY**2 * float(target @ target)
+    if len(found.taken) == 1 and not faint:
         return True
 
     def part(first: Fit) -> float:
         return verification.share(less, found.last, first, asked.held, rephased)
 
-    enough = min(OF_BASE * found.base.energy, MOST * less.energy)
-    weak = less.energy - found.last.energy < enough
+    weak = faint or gained < min(OF_BASE * found.base.energy, MOST * less.energy)
     return (part(found.base) >= LEAST_OF_BASE and not weak) or part(less) >= GOOD_PART

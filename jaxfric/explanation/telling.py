@@ -61,7 +61,7 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     return Explanation(
-        verdict=_verdict(findings, before, after, _rough(*rest, found.base), standing),
+        verdict=_verdict(findings, before, after, _rough(*rest, found), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=_errors(asked, first, *rest),
@@ -131,11 +131,11 @@ ROUGH = 4.0
 HALF_ROUGH, QUARTER = 1.25, 0.25
 
 
-def _rough(asked: Question, found: Named, base: Fit) -> bool:
+def _rough(asked: Question, left: Named, found: Named) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or much of it all."""
-    error = verification.error(found.last, asked.evidence)
-    floor = verification.noise(found.last, asked.evidence.target)
-    much = found.last is not base and found.last.energy > QUARTER * base.energy
+    error = verification.error(left.last, asked.evidence)
+    floor = verification.noise(left.last, asked.evidence.target)
+    much = bool(found.taken) and left.last.energy > QUARTER * found.base.energy
     return error > (HALF_ROUGH if much else ROUGH) * floor and error > LINEARITY
 
 
