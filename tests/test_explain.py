@@ -693,15 +693,39 @@ def test_findings_bring_a_model_nearer_to_the_held_out_recording(healthy, monkey
     assert explaining._verified(kept, asked, 0) is kept
 
 
+def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(monkeypatch):
+    asked = types.SimpleNamespace(evidence=types.SimpleNamespace(target=None))
+    monkeypatch.setattr(verification, "noise", lambda *_: 0.01)
+    for taken, left, error, rough in (
+        ([], 1.0, 0.02, False),  # as a healthy machine's slow loads
+        ([], 1.0, 0.05, True),
+        ([0], 0.5, 0.012, False),
+        ([0], 0.5, 0.014, True),
+        ([0], 0.2, 0.014, False),
+    ):
+        monkeypatch.setattr(verification, "error", lambda *_, error=error: error)
+        last = types.SimpleNamespace(energy=left)
+        found = types.SimpleNamespace(
+            taken=taken, last=last, base=types.SimpleNamespace(energy=1.0)
+        )
+        assert telling._rough(asked, found, found) is rough
+
+
 def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch):
     base, less, more = (types.SimpleNamespace(energy=e) for e in (1000.0, 3.0, 1.8))
     found = types.SimpleNamespace(base=base, last=more, taken=[0, 0])
-    asked = types.SimpleNamespace(held=None)
+    rows = types.SimpleNamespace(target=np.array([100.0]))
+    asked = types.SimpleNamespace(held=None, evidence=rows)
     parts = {}
     monkeypatch.setattr(verification, "helps", lambda *_: True)
     monkeypatch.setattr(verification, "share", lambda less, more, first, *_: parts[first.energy])
     for left, of_rest, holds in ((1.8, 0.2, False), (1.8, 0.3, True), (1.2, 0.2, True)):
         more.energy, parts[1000.0], parts[3.0] = left, 0.001, of_rest
+        assert explaining._holds(less, found, asked, frozenset()) is holds
+    # One alone only if it is within the linearity of a sensor, 0.2 % of a force of 100 N.
+    found.taken = [0]
+    for left, of_rest, holds in ((1.8, 0.0, True), (2.97, 0.2, False), (2.97, 0.3, True)):
+        more.energy, parts[3.0] = left, of_rest
         assert explaining._holds(less, found, asked, frozenset()) is holds
     # And the search lets in a third of the rest only where that will be asked.
     effects = EFFECTS["spring"], [EFFECTS["cogging"]]
