@@ -110,7 +110,8 @@ def local_quadratic(
     **Arguments:** `signal`, shape `(N,)`; `half_width`, s; `reach`, the number of samples to each
     side that are looked at.
 
-    **Returns:** level and slope, both `(N,)`; zero slope where fewer than three samples are near.
+    **Returns:** level and slope, both `(N,)`; those of a straight line where only two samples are
+    near, as at the end of a record with a jittery clock, and zero slope where there is but one.
     """
     time, valid, segment = recording.time, recording.mask, recording.segment
     padded = [
@@ -137,9 +138,14 @@ def local_quadratic(
     safe = jnp.where(enough, determinant, 1.0)
     level = (x0 * minor0 - x1 * minor1 + x2 * minor2) / safe
     slope = (-x0 * minor1 + x1 * (s0 * s4 - s2**2) - x2 * (s0 * s3 - s1 * s2)) / safe
+    spread = s0 * s2 - s1**2
+    two = spread > 1e-9 * (s0**2 + jnp.finfo(time.dtype).tiny)
+    safe = jnp.where(two, spread, 1.0)
+    straight = jnp.where(two, s0 * x1 - s1 * x0, 0.0) / safe
+    flat = jnp.where(two, s2 * x0 - s1 * x1, 0.0) / safe
     return (
-        signal + jnp.where(enough, level, 0.0),
-        jnp.where(enough, slope, 0.0) / half_width,
+        signal + jnp.where(enough, level, flat),
+        jnp.where(enough, slope, straight) / half_width,
     )
 
 

@@ -36,8 +36,14 @@ def test_a_parabola_on_an_irregular_clock_has_its_exact_derivative(seed, factors
     position = scale * (a + b * time / 0.2 + c * (time / 0.2) ** 2)
     slope = scale * (b / 0.2 + 2 * c * time / 0.2**2)
     found = signals.derivative(log(time, position), position, width)
+    # Three samples make a parabola; of two, where the clock leaves no more, a line.
+    near = np.abs(time[:, None] - time) < 0.95 * (width + 0.5) * np.median(np.diff(time))
+    near = np.sum(near & (np.abs(np.subtract.outer(np.arange(200), np.arange(200))) <= width), 1)
+    line = scale * 2 * abs(c) / 0.2**2 * 1.5e-3
     # Rounding of a position of one unit, differenced over a millisecond and less.
-    np.testing.assert_allclose(found, slope, rtol=0, atol=1e-8 * scale)
+    error = np.abs(np.asarray(found) - slope)
+    assert np.all(error <= np.where(near > 2, 1e-8 * scale, line + 1e-8 * scale))
+    assert np.mean(near > 2) > 0.97
 
 
 def test_segments_do_not_see_each_other():
