@@ -14,9 +14,11 @@ from .chance import LEVEL
 from .evidence import Evidence
 from .regression import Fit
 
-# Resolution cells on either side whose median is the noise about a line: thousands would take in
-# the noise's own colour, and of a few the line itself is too many.
-NEIGHBOURS = 32
+# Resolution cells whose median is the noise about a line: thousands would take in the noise's own
+# colour, and of a few the line itself is too many.
+NEIGHBOURS = 64
+# A record with more gaps than this, as a day between two runs, has a clock but no spectrum.
+SPARSE = 16
 
 
 def fast_tone(evidence: Evidence, now: Fit) -> list[Candidate]:
@@ -24,26 +26,29 @@ def fast_tone(evidence: Evidence, now: Fit) -> list[Candidate]:
 
     Up to where it has a period in the kernel's half: beyond, rows cannot tell it from a slower one.
     """
-    scanned = line_frequencies(evidence, "time")[-1]
-    top = 1 / evidence.reach
+    scanned, top = line_frequencies(evidence, "time")[-1], 1 / evidence.reach
     if not evidence.clock or scanned >= top:
         return []
     time = np.asarray(evidence.motion.time)[evidence.centre]
     place = np.round((time - time[0]) * 2 * top).astype(int)
+    if place[-1] > SPARSE * len(place):
+        return []
     series = np.zeros(OVERSAMPLING * (int(place[-1]) + 1))
     series[place] = now.residual
-    power = np.abs(np.fft.rfft(series)) ** 2
     tones = np.fft.rfftfreq(len(series), 0.5 / top)
-    near = OVERSAMPLING * NEIGHBOURS
     above = tones > scanned
-    if np.sum(above) < 2 * near:
+    power, tones = np.abs(np.fft.rfft(series)[above]) ** 2, tones[above]
+    near = OVERSAMPLING * NEIGHBOURS
+    parts = len(power) // near
+    if not parts:
         return []
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(power, near, "reflect"), 2 * near + 1)
-    ratio = power[above] / np.maximum(np.median(around[above], axis=1) / np.log(2), 1e-300)
+    part = np.minimum(np.arange(len(power)) // near, parts - 1)
+    noise = np.median(power[: parts * near].reshape(parts, near), axis=1) / np.log(2)
+    ratio = power / np.maximum(noise[part], 1e-300)
     best = int(np.argmax(ratio))
-    tone = tones[above][best]
+    tone = tones[best]
     if np.exp(-ratio[best]) * len(ratio) > LEVEL or shared(np.array([tone]), evidence)[0] >= OWN:
         return []
-    places = tone + tones[1] * np.arange(-2, 3)
+    places = tone + (tones[1] - tones[0]) * np.arange(-2, 3)
     effect, lines = EFFECTS["periodic_disturbance"], Lines("time", False)
     return [Candidate(effect, laws.PeriodicDisturbance(), places[:, None], lines)]
