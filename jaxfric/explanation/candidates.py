@@ -9,21 +9,19 @@ import numpy as np
 
 from .. import terms as laws
 from ..catalogue import CATALOGUE, Effect
+from ..effects import EFFECTS
 from ..recording import Recording
 from ..terms.base import AbstractTerm, Directional, summands
 from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
+from .lines import Lines, line_frequencies
 from .predictions import PREDICTED
 from .regression import Space
 from .threads import begin
+from .tones import tones_to_try
 
 # Points of a grid over one nonlinear parameter, where nothing finer is needed below.
 GRID = 24
-# Four frequencies a resolution cell (one over the range): the peak then lies within an eighth of a
-# cell of one of them, where the loss is under 3 % of its power.
-OVERSAMPLING = 4
-# Bounds the cost on very long records: 512 periods in the range.
-MOST_LINES = 2048
 # Effects that time alone drives: another recording need not show them.
 OF_THE_MOMENT = frozenset(
     {"friction_step", "load_drift", "disturbance_pulses", "thermal_drift", "periodic_disturbance"}
@@ -39,7 +37,7 @@ class Candidate(NamedTuple):
     effect: Effect
     term: AbstractTerm
     betas: np.ndarray
-    lines: "Lines | None" = None
+    lines: Lines | None = None
     least: float = 0.0
 
     def columns(self, evidence: Evidence) -> np.ndarray:
@@ -47,64 +45,6 @@ class Candidate(NamedTuple):
         if self.lines is not None:
             return self.lines.columns(evidence, self.betas[:, 0])
         return evidence.columns(self.term, self.betas)
-
-
-class Lines(NamedTuple):
-    """Waves over a coordinate at the rows, without the nodes: sine and cosine, damped.
-
-    Over a kernel the coordinate is taken as a straight line; averaging then multiplies a wave by
-    the kernel's Fourier transform at 2πf·rate·reach. `coordinate`: "position" or "time";
-    `inverse`: whether the parameter is a period; `sided`: times the direction; `harmonics`.
-    """
-
-    coordinate: str
-    inverse: bool
-    sided: bool = False
-    harmonics: int = 1
-
-    def columns(self, evidence: Evidence, parameters: np.ndarray) -> np.ndarray:
-        """Columns at each frequency or period, `(G, J, 2 harmonics)`."""
-        frequency = 1 / parameters if self.inverse else parameters
-        value = np.asarray(getattr(evidence.motion, self.coordinate))[evidence.centre]
-        value = value - value.mean()
-        rate = np.asarray(evidence.motion.velocity)[evidence.centre]
-        rate = rate if self.coordinate == "position" else np.ones_like(rate)
-        swept = np.abs(2 * np.pi * evidence.reach * rate).astype(np.float32)
-        side = evidence.side.astype(np.float32) if self.sided else np.float32(1)
-        columns = np.empty((len(parameters), 2 * self.harmonics, len(value)), np.float32)
-        for n in range(1, self.harmonics + 1):
-            for some in range(0, len(parameters), _AT_ONCE):
-                waves = n * frequency[some : some + _AT_ONCE, None]
-                angle = _angle(waves * value)
-                at = np.minimum(waves.astype(np.float32) * (20 * swept) + 0.5, len(_GAINS) - 1)
-                gain = _GAINS[at.astype(np.int32)] * side
-                out = columns[some : some + _AT_ONCE, 2 * n - 2 : 2 * n]
-                np.multiply(gain, np.sin(angle), out=out[:, 0])
-                np.multiply(gain, np.cos(angle), out=out[:, 1])
-        return columns.transpose(0, 2, 1)
-
-
-# Waves whose numbers stay in the cache while they are worked on.
-_AT_ONCE = 8
-
-
-def _angle(turns: np.ndarray) -> np.ndarray:
-    """Turns as angles, without whole turns, so that single precision is enough for their sines."""
-    return np.float32(2 * np.pi) * (turns - np.round(turns)).astype(np.float32)
-
-
-def _transform():
-    """∫ φ(τ) cos(zτ) dτ / ∫ φ dτ of the kernel φ = (1 − τ²)⁴, for z up to 30 (below 1e-4 there)."""
-    tau = np.linspace(-1.0, 1.0, 1001)
-    weight = (1 - tau**2) ** 4
-    turns = np.linspace(0.0, 30.0, 601)
-    gains = np.cos(turns[:, None] * tau[None, :]) @ weight / np.sum(weight)
-    gains[-1] = 0.0
-    return gains.astype(np.float32)
-
-
-# Tabulated in steps of 1/20, half of which shifts a gain by less than 0.006.
-_GAINS = _transform()
 
 
 class Field:
@@ -212,7 +152,8 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
             periods = np.concatenate([stroke * 2.0 ** np.arange(3, 0, -0.5), periods])
         yield Candidate(effect, term, periods[:, None], Lines("position", True, sided, harmonics))
     elif kind is laws.PeriodicDisturbance:
-        yield from _tones(effect, term, line_frequencies(evidence, "time"), evidence)
+        for tones, least in tones_to_try(evidence):
+            yield from at_tones(tones, least)
     elif kind is laws.StickySpot:
         yield Candidate(effect, term, _spots(evidence))
     elif kind is laws.Compliance:
@@ -233,6 +174,13 @@ def _with_places(effect: Effect, term: AbstractTerm, evidence: Evidence) -> Iter
         yield Candidate(effect, term, _grid(term, evidence))
 
 
+def at_tones(tones: np.ndarray, least: float = 0.0) -> list[Candidate]:
+    """A force periodic in time at some frequencies, Hz, `(G,)`; none where there are none."""
+    effect, lines = EFFECTS["periodic_disturbance"], Lines("time", False)
+    term = laws.PeriodicDisturbance()
+    return [Candidate(effect, term, tones[:, None], lines, least)] if len(tones) else []
+
+
 def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     """Places over the compact set: all nonlinear parameters together along its diagonal."""
     space = Space([term], evidence)
@@ -243,45 +191,6 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     fine = 8 * GRID if isinstance(term, laws.FrictionStep) else GRID
     along = (np.arange(fine) + 0.5) / fine
     return space.beta(np.repeat(along[:, None], count, axis=1))
-
-
-# Part of the motion's variance in a tone's resolution cell from which the tone is the motion's own:
-# an unrelated one holds two of some thousand values.
-OWN = 0.05
-# What the motion drives is in all of its tones or, where it is one wave, in that and its multiples.
-# But a force that is all in another one, or in one of many, has a clock of its own.
-ITSELF, ALL = 0.5, 0.9
-
-
-def _tones(effect: Effect, term: AbstractTerm, tones: np.ndarray, evidence) -> Iterator[Candidate]:
-    """Those that the motion does not have, and those that it has but need not drive."""
-    power = shared(tones, evidence)
-    own = power >= OWN
-    if np.any(~own):
-        yield Candidate(effect, term, tones[~own, None], Lines("time", False))
-    if power.max() >= ITSELF:
-        lowest = int(np.argmax(power >= ITSELF))
-        wave = tones[lowest + int(np.argmax(power[lowest : lowest + OVERSAMPLING]))]
-        own &= np.abs(tones - wave * np.round(tones / wave)) > OVERSAMPLING * np.diff(tones[:2])
-    if np.any(own):
-        yield Candidate(effect, term, tones[own, None], Lines("time", False), ALL)
-
-
-def shared(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
-    """The part of the motion's variance in the cell of each tone: the largest of its signals'."""
-    motion, rows = evidence.motion, evidence.centre
-    time, velocity = np.asarray(motion.time)[rows], np.asarray(motion.velocity)[rows]
-    signals = [velocity, np.abs(velocity), evidence.side]
-    if motion.position is not None:
-        signals.append(np.asarray(motion.position)[rows])
-    series = np.stack([signal - signal.mean() for signal in signals])
-    series /= np.maximum(np.linalg.norm(series, axis=1), 1e-300)[:, None]
-    power = np.empty(len(tones))
-    for some in range(0, len(tones), _AT_ONCE):
-        angle = _angle(tones[some : some + _AT_ONCE, None] * (time - time[0]))
-        both = (series @ np.stack([np.sin(angle), np.cos(angle)]).transpose(0, 2, 1)) ** 2
-        power[some : some + _AT_ONCE] = np.max(np.sum(both, axis=0), axis=0) * 2 / len(time)
-    return power
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
@@ -338,22 +247,3 @@ def _spots(evidence: Evidence) -> np.ndarray:
     return np.array(
         [(at, w) for w in widths for at in np.arange(limits.low + w / 2, limits.high, w)]
     )
-
-
-def line_frequencies(evidence: Evidence, coordinate: str) -> np.ndarray:
-    """Equally spaced frequencies that resolve every line of a coordinate.
-
-    From one period in the range (one and a half in time: fewer are a drift) to where a wave at
-    the slow quartile of the speed has half a period in the kernel: shorter ones are averaged away.
-    """
-    limits = evidence.limits
-    top = 0.5 / evidence.reach
-    if coordinate == "time":
-        span, low = limits.duration, 1.5 / limits.duration
-    else:
-        span = limits.high - limits.low
-        speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
-        low, top = 1.0 / span, top / np.quantile(speed, 0.25)
-    top = max(top, 2 * low)
-    count = int(np.clip(np.ceil(OVERSAMPLING * span * (top - low)), 16, MOST_LINES))
-    return np.linspace(low, min(top, low + count / (OVERSAMPLING * span)), count)

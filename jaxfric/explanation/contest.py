@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..terms import Cogging, DisturbancePulses
-from .candidates import Candidate, Field, scaled
+from .candidates import Candidate, Field, at_tones, scaled
 from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .pulses import pulses
@@ -108,7 +108,7 @@ def contest(
         )
     ]
     known = any(isinstance(term, DisturbancePulses) for term in now.terms)
-    for candidate in [*([] if known else pulses(seen, now)), *fast_tone(seen, now)]:
+    for candidate in [*([] if known else pulses(seen, now)), *at_tones(fast_tone(seen, now))]:
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events, nor about a line among thousands: what
         # stands out has been tested.

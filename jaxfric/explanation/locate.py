@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .candidates import Lines, line_frequencies, scaled
+from .candidates import scaled
 from .chance import Judge, Scan, adjusted, blocks
 from .evidence import Evidence
+from .lines import Lines, line_frequencies
 from .regression import Fit, fit
 from .threads import each
 

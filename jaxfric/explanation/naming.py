@@ -189,7 +189,6 @@ def _force(finalist: Finalist, evidence) -> np.ndarray:
 # force's root mean square, cannot be told from the sensor whatever its p-value.
 LINEARITY = 2e-3
 # That of the best is half of it; what takes as much off another recording too is of the machine.
-# Not asked of terms on derivatives, which noise feeds there as well, nor of what time alone drives.
 LINEARITY_JUDGED = 1e-3
 
 
@@ -204,6 +203,9 @@ EASY_OF_BASE = 0.05
 EASY = frozenset(
     {"transport_delay", "actuator_lag", "compliance", "backlash", "disturbance_pulses"}
 )
+# What time alone drives need not come again in another recording, and noise feeds terms on
+# derivatives there as well.
+UNJUDGED = EASY | SHARP | OF_THE_MOMENT
 # Each of these is an idealisation of what happens about a reversal (one spring, friction without a
 # dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
 AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
@@ -221,7 +223,7 @@ def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list
         gained = now.energy - finalist.energy
         candidate = finalist.trial.candidate
         effect = candidate.effect
-        repeats = judged and effect.name not in EASY | SHARP | OF_THE_MOMENT
+        repeats = judged and effect.name not in UNJUDGED
         floor = (LINEARITY_JUDGED if repeats else LINEARITY) ** 2 * force
         enough = gained >= max(max(least, candidate.least) * now.energy, floor)
         if effect.name == "load_drift":
