@@ -24,6 +24,7 @@ from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
 from .telling import tell
 from .timing import LATE, late, overlooked, settled
+from .views import weightless
 
 
 def explain(
@@ -208,14 +209,24 @@ def _sought(asked: Question, seed, refuted: frozenset[Hashable] = frozenset(), s
 
 
 def _verified(found: Named, asked: Question, seed) -> Named:
+    """Without terms that do not hold: on the held-out recording, or by their own size."""
+    held = found if asked.held is None else _helpful(found, asked)
+    evidence = with_predictions(asked.evidence, held.last)
+    sized = held
+    while (idle := next(weightless(sized, asked), None)) is not None:
+        sized = _lacking(sized, evidence, idle)
+    if len(sized.taken) < len(found.taken):
+        sized = sized._replace(left=contest(evidence, sized.last, asked.field, seed))
+    return sized
+
+
+def _helpful(found: Named, asked: Question) -> Named:
     """Without terms that do not help on the held-out recording, each beside the others.
 
     Each is judged without that recording's events, by which it may be far off; all of them together
     are to be nearer to it than the baseline as it is.
     """
-    if asked.held is None:
-        return found
-    evidence, first = with_predictions(asked.evidence, found.last), found
+    evidence = with_predictions(asked.evidence, found.last)
     for number in reversed(_lasting(found)):
         less = verification.lacking(found, evidence, number)
         place = len(found.last.terms) - len(found.taken) + number
@@ -233,8 +244,6 @@ def _verified(found: Named, asked: Question, seed) -> Named:
     while _lasting(found) and _error(found, asked) > before:
         fewer = [_lacking(found, evidence, number) for number in _lasting(found)]
         found = min(fewer, key=lambda each: _error(each, asked))
-    if len(found.taken) < len(first.taken):
-        found = found._replace(left=contest(evidence, found.last, asked.field, seed))
     return found
 
 
@@ -250,7 +259,9 @@ def _lacking(found: Named, evidence, number: int) -> Named:
 
 
 def _error(found: Named, asked: Question) -> float:
-    return verification.error(found.last, asked.held, found.rephased)
+    """On the held-out recording, or without one on its own."""
+    judge = asked.evidence if asked.held is None else asked.held
+    return verification.error(found.last, judge, found.rephased)
 
 
 # On the held-out recording a later term has to take the least part of the baseline's mismatch that

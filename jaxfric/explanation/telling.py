@@ -21,7 +21,7 @@ from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fast, fit
 from .sentences import mismatch_sentence, sentence
-from .timing import LATE
+from .views import estimated
 
 
 def tell(
@@ -51,7 +51,7 @@ def tell(
         after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
         after = _through_wide(after, left.last, where.wide, seed)
         after = _lasting(after, left.last, where)
-    findings = _findings(found, asked, rest, first, units)
+    findings = _findings(found, asked, rest, first)
     standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
@@ -157,9 +157,9 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
     return "unexplained" if before or rough else "consistent"
 
 
-def _findings(found: Named, asked: Question, rest, first: Fit, units) -> list[Finding]:
+def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
     start = len(found.last.terms) - len(found.taken)
-    values = _estimates(found, asked, rest, units)[start:]
+    values = estimated(found, asked, rest)[start:]
     findings = []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
@@ -210,44 +210,6 @@ def _shares(
     )
     power = np.sum(verification.residual(first, asked.held) ** 2)
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
-
-
-def _estimates(found: Named, asked: Question, rest, units) -> list[dict[str, Estimate]]:
-    """The parameters of each term; their errors contain what another view of the machine changes.
-
-    Views are a kernel of twice the width and the held-out recording. Where the force acts late,
-    that is seen with the force put back, `rest`, by all terms but the last, which is the delay or
-    lag itself.
-    """
-    ours = spelled.estimates(found.last, asked.block, units)
-    where, left = rest if isinstance(found.last.terms[-1], LATE) else (asked, found)
-    late = [
-        {
-            name: own._replace(standard_error=np.hypot(own.standard_error, found.smoothed))
-            for name, own in term.items()
-        }
-        for term in ours[len(left.last.terms) :]
-    ]
-    both, count = ours[: len(left.last.terms)], int(where.block[-1]) + 1
-    if where.wide is not None:
-        wide = _seen_by(where.wide, left.last, count, units)
-        both = [spelled.with_smoothing(*pair) for pair in zip(both, wide, strict=True)]
-    if where.held is not None:
-        # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
-        lasting = verification.lasting(left.last, left.rephased)
-        there = _seen_by(where.held, lasting, count, units)
-        own = {id(term): values for term, values in zip(lasting.terms, there, strict=True)}
-        both = [
-            spelled.with_elsewhere(mine, own.get(id(term), mine))
-            for term, mine in zip(left.last.terms, both, strict=True)
-        ]
-    return both + late
-
-
-def _seen_by(view: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
-    """The parameters of a model refitted to another view of the machine, in `count` blocks."""
-    again = fit(known.terms, with_predictions(view, known), known.betas, 4)
-    return spelled.estimates(again, np.arange(len(view.rows)) * count // len(view.rows), units)
 
 
 def _dated(parameters: dict[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
