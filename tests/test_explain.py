@@ -31,6 +31,7 @@ from jaxfric.explanation import (
     timing,
     tones,
     verification,
+    views,
 )
 from jaxfric.explanation.sentences import sentence
 from jaxfric.uncertainty import Estimate
@@ -606,6 +607,32 @@ def test_what_was_refuted_is_not_named_again(healthy):
     other = again.taken[0].trial.candidate
     assert other.effect is candidate.effect and not naming.marks(other) & forms
     assert not list(explaining._refuted(plain, plain, asked))
+
+
+def beside(asked, term):
+    """A search that has found that term, fitted beside the base, and what it is taken to be."""
+    betas = (*asked.base.betas, np.asarray(term.beta()))
+    last = regression.fit((*asked.base.terms, term), asked.evidence, betas, 0)
+    return naming.Named(asked.base, last, [naming.Taken(None, (), 0.002)], None)
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1.0])
+def test_a_finding_that_adds_inertia_has_some(healthy, inertia):
+    first, second = (planted(run, LOAD, (inertia,)) for run in healthy)
+    for held in (None, second):
+        asked = question.ask(first, held, models.named("gaussian"))
+        idle = [0] if inertia == 0.0 else []
+        assert list(views.weightless(beside(asked, LOAD), asked)) == idle
+        # Friction adds none, and is not asked for it.
+        assert not list(views.weightless(beside(asked, terms.Spring()), asked))
+
+
+def test_where_a_load_has_no_inertia_other_effects_are_asked(healthy, monkeypatch):
+    run = planted(healthy[0], *CASES["cogging"])
+    monkeypatch.setattr(explaining, "weightless", lambda found, _: iter(range(len(found.taken))))
+    asked, found = explaining._proved(run, None, models.named("gaussian"), 0)
+    assert "cogging" not in explaining._names(found)
+    assert found.left.trials and len(found.last.terms) == 1 + len(found.taken)
 
 
 def test_a_dead_band_is_crossed_when_the_command_crosses():
