@@ -95,6 +95,11 @@ class Lines(eqx.Module):
         first, second = _of(side, self.scale)
         return [first, second * (speed - _of(side, self.centre))]
 
+    def straight(self, shares: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
+        """Constant and slope of a combination of them in each direction."""
+        first, second = (shares * self.scale).T
+        return jnp.stack([first - second * self.centre, second], axis=1)
+
 
 def orthonormal_lines(speed: Float[Array, " n"], weights: Float[Array, "2 n"]) -> Lines:
     """The [`Lines`][] that are orthonormal over weighted places; zero where there are none."""
@@ -113,7 +118,8 @@ class Straightened(eqx.Module):
     """Samples of two directions, the best straight line of each taken off the force.
 
     `speed`, m/s, `side`, 0 or 1, the direction, `weight`, s, and the `force` left, N, all `(N,)`;
-    `lines`, orthonormal over the samples of each direction.
+    `lines`, orthonormal over the samples of each direction; `taken`, constant, N, and slope, N·s/m,
+    of what was taken off; `slowest` speed, m/s.
     """
 
     speed: Float[Array, " N"]
@@ -121,6 +127,8 @@ class Straightened(eqx.Module):
     weight: Float[Array, " N"]
     force: Float[Array, " N"]
     lines: Lines
+    taken: Float[Array, "2 2"]
+    slowest: Float[Array, ""]
 
     def gains(
         self,
@@ -171,15 +179,15 @@ def compressed(
     places, few, loads = nodes(panels), sums[:, 0], sums[:, 1]
     lines = orthonormal_lines(places, few)
     values = lines(places)
-    share = _shares(values, loads)
-    force = force - _line(lines, share, speed, side)
+    taken, share = rough.straight(share), _shares(values, loads)
+    force, taken = force - _line(lines, share, speed, side), taken + lines.straight(share)
     along = values * few[:, None, :]
     loads = loads - jnp.sum(share[:, :, None] * along, axis=1)
     against = jnp.concatenate([along, loads[:, None, :]], axis=1)
     total = jnp.sum(few, axis=0)
     shared = orthonormal_lines(places, total[None])(places)[0].T
     moments = Moments(shared, total[:, None] * shared, against, few, weights @ force**2)
-    return moments, Straightened(speed, side, weight, force, lines)
+    return moments, Straightened(speed, side, weight, force, lines, taken, panels[0])
 
 
 def _shares(lines, loads):

@@ -94,8 +94,8 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    beta, converged, border = search(active, recording, rows, box, grid, alike)
-    alpha, jacobian, error = _solve(active, beta, recording, rows)
+    beta, converged, border, alpha = search(active, recording, rows, box, grid, alike)
+    alpha, jacobian, error = _solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)
     alpha, spread, left, pull = _judged(
@@ -205,13 +205,16 @@ def _without_inertia(term: AbstractTerm) -> AbstractTerm:
     return Sum(kept)
 
 
-def _solve(term, beta, recording, rows: Rows):
-    """Affine parameters at β, the Jacobian by all parameters, and the residual, unweighted."""
+def _solve(term, beta, recording, rows: Rows, alpha=None):
+    """Affine parameters at β, the Jacobian by all parameters, and the residual, unweighted.
+
+    `alpha`: their values, if known.
+    """
     known = term.with_beta(beta)
     columns = rows.columns(known, recording)
     target = rows.target - rows.offset(known, recording)
     root = reduced.root(rows.positive + rows.negative)
-    alpha = reduced.least_squares(root[:, None] * columns, root * target)
+    alpha = reduced.least_squares(root[:, None] * columns, root * target, alpha)
     if not term.nonlinear:
         return alpha, columns, target - columns @ alpha
 

@@ -152,18 +152,26 @@ def cost(
 
 
 @jax.custom_jvp
-def least_squares(columns: Float[Array, "J p"], target: Float[Array, " J"]) -> Float[Array, " p"]:
-    """Least-squares coefficients, eq. (19); zero for a column that the ones before it span."""
-    return _basis(columns).solve(target)
+def least_squares(
+    columns: Float[Array, "J p"],
+    target: Float[Array, " J"],
+    known: Float[Array, " p"] | None = None,
+) -> Float[Array, " p"]:
+    """Least-squares coefficients, eq. (19); zero for a column that the ones before it span.
+
+    `known`: the coefficients themselves, where they come from a shorter way and only their
+    derivative is asked for.
+    """
+    return _basis(columns).solve(target) if known is None else known
 
 
 @least_squares.defjvp
 def _(primals, tangents):
     """By the normal equations Aᵀ(t − Aα) = 0: the steps of the solution are not differentiated."""
-    columns, target = primals
-    turned, moved = tangents
+    columns, target, known = primals
+    turned, moved, _ = tangents
     basis = _basis(columns)
-    alpha = basis.solve(target)
+    alpha = basis.solve(target) if known is None else least_squares(*primals)
     rest = target - columns @ alpha
     return alpha, basis.solve(moved - turned @ alpha) + basis.divide(turned.T @ rest)
 

@@ -14,15 +14,20 @@ from .sides import Sides
 from .terms.base import AbstractTerm, Directional, Sum, summands
 from .terms.friction import AbstractBump, Coulomb, Viscous
 
+# Roundings by which sums over many samples may differ from those over nodes.
+EXACT = 64
+
 
 class Found(NamedTuple):
     """The nonlinear parameters β `(d,)`, whether the refinement converged, and whether β lies on
-    the border of its bounds.
+    the border of its bounds; `alpha`, the affine parameters `(p,)` where nodes say them too, with
+    no derivative.
     """
 
     beta: Float[Array, " d"]
     converged: Bool[Array, ""]
     on_border: Bool[Array, ""]
+    alpha: Float[Array, " p"] | None = None
 
 
 def _sides(term: AbstractTerm):
@@ -58,10 +63,11 @@ def search(
     frozen = jax.lax.stop_gradient(problem)
     sides = _sides(term)
     best = _grid_whole(frozen, grid) if sides is None else _grid_sides(sides, frozen, grid)
-    unit, converged = _refine(frozen, best)
-    unit = _implicit(jax.lax.stop_gradient(unit), problem)
+    unit, converged = jax.lax.stop_gradient(_refine(frozen, best))
+    alpha = None if best.samples is None else _affine(frozen, best, unit)
+    unit = _implicit(unit, problem)
     border = jnp.any((unit <= 0) | (unit >= 1))
-    return Found(reduced.decode(unit, box, logarithmic), converged, border)
+    return Found(reduced.decode(unit, box, logarithmic), converged, border, alpha)
 
 
 class _Best(NamedTuple):
@@ -139,14 +145,44 @@ def _refine(problem: _Problem, best: _Best):
     start = best.start.reshape(2, -1)
     unit, converged = best.sides.refined(start, best.cell.reshape(2, -1))
     if best.samples is not None:
-        both = jnp.stack([start, unit], axis=1)
-        before, after = best.sides.check(both, best.samples).T
-        fine = after >= before * (1 - 64 * jnp.finfo(unit.dtype).eps)
-        # Nodes that are off by half the digits do not stand for these samples.
-        off = jnp.abs(best.sides.gains(both)[:, 1] - after)
-        true = off <= jnp.finfo(unit.dtype).eps ** 0.5 * best.sides.moments.whole
+        eps = jnp.finfo(unit.dtype).eps
+        after = best.sides.check(unit[:, None], best.samples)[:, 0]
+        off = jnp.abs(best.sides.gains(unit[:, None])[:, 0] - after)
+        # Nodes that are off by half the digits do not stand for these samples; those that are exact
+        # know that the refinement has not lost what the grid had.
+        whole = best.sides.moments.whole
+        true, exact = off <= eps**0.5 * whole, jnp.all(off <= EXACT * eps * whole)
+
+        def better():
+            before = best.sides.check(start[:, None], best.samples)[:, 0]
+            return after >= before * (1 - EXACT * eps)
+
+        fine = jax.lax.cond(exact, lambda: jnp.ones(2, bool), better)
         unit, converged = jnp.where(fine[:, None], unit, start), converged & fine & true
     return unit.reshape(-1), jnp.all(converged)
+
+
+def _affine(problem: _Problem, best: _Best, unit) -> Float[Array, " p"] | None:
+    """The affine parameters as the nodes say them; `None` where a direction has a term twice."""
+    places = [
+        (direction, leaf)
+        for term in summands(problem.term)
+        if isinstance(term, Directional)
+        for direction, side in enumerate((term.positive, term.negative))
+        for leaf in summands(side)
+    ]
+    if len(places) != 6:
+        return None
+    units = unit.reshape(2, -1)
+    bump = next(leaf for _, leaf in places if isinstance(leaf, AbstractBump))
+
+    def most(point, box):
+        beta = reduced.decode(point, box, best.sides.logarithmic)
+        return bump.with_beta(beta).shape(best.samples.slowest)
+
+    values = best.sides.affine(units, jax.vmap(most)(units, problem.boxes), best.samples)
+    columns = {Coulomb: 0, Viscous: 1, type(bump): 2}
+    return jnp.stack([values[direction, columns[type(leaf)]] for direction, leaf in places])
 
 
 @jax.custom_jvp

@@ -63,6 +63,34 @@ class Sides(NamedTuple):
 
         return samples.gains(bumps, shares)
 
+    def affine(
+        self, unit: Float[Array, "2 d"], most: Float[Array, " 2"], samples: compress.Straightened
+    ) -> Float[Array, "2 3"]:
+        """Constant, N, slope, N·s/m, and height of the bump, N, of each direction's best fit.
+
+        `most`: the bump's values at the slowest speed; over them, less one, it is `bump` here.
+        """
+
+        def side(item):
+            unit, box, most, line, along, loads, weights = item
+            contrast = rest = self.at(unit, box)
+            shares = jnp.zeros(2, rest.dtype)
+            for _ in range(2):  # once more for rounding
+                more = along @ rest
+                rest, shares = rest - more @ line, shares + more
+            size, whole = weights @ rest**2, weights @ (1 + contrast) ** 2
+            limits = jnp.finfo(rest.dtype)
+            # A bump that is a straight line there, or vanishes in all samples, has no height.
+            visible = (size > (100 * limits.eps) ** 2 * whole) & (most > limits.tiny**0.5)
+            force = jnp.where(visible, loads @ rest / jnp.where(visible, size, 1.0), 0.0)
+            return shares, force, force / jnp.where(visible, most, 1.0)
+
+        lines, against = samples.lines(self.places), self.moments.against
+        rows = lines, against[:, :2], against[:, 2], self.moments.weights
+        shares, force, height = jax.lax.map(side, (unit, self.boxes, most, *rows))
+        straight = samples.taken - force[:, None] * samples.lines.straight(shares)
+        return jnp.stack([straight[:, 0] - force, straight[:, 1], height], axis=1)
+
     def refined(self, start: Float[Array, "2 d"], cell: Float[Array, "2 d"]):
         """The minimiser of each direction near its start, `(2, d)`, and which converged."""
         from . import refine  # optimistix takes long to import, and a kept program does without

@@ -48,6 +48,28 @@ def cost(beta, velocity, force, weight):
     return np.array(costs)
 
 
+def curve(alpha, beta, data):
+    """Friction at the samples, N, by affine parameters in the term's order and the widths."""
+    velocity = data[0]
+    speed, sign, there = np.abs(velocity), np.sign(velocity), data[2] > 0
+    bump = np.exp(-((speed / np.where(velocity > 0, *beta)) ** 2))
+    sides = np.asarray(alpha).reshape(3, 2).T
+    coulomb, viscous, height = np.where(velocity > 0, *sides[..., None])
+    return (sign * (coulomb + viscous * speed + height * bump))[there]
+
+
+def least_squares(beta, data):
+    """The affine parameters at the widths, by a singular value decomposition of the samples."""
+    alpha = np.zeros((2, 3))
+    for side, (width, used) in enumerate(zip(beta, (data[0] > 0, data[0] < 0), strict=True)):
+        v, root = np.abs(data[0][used]), np.sqrt(data[2][used])
+        columns = root[:, None] * np.stack([np.ones_like(v), v, np.exp(-((v / width) ** 2))], 1)
+        size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        target = root * np.abs(data[1][used]) * np.sign(data[1][used] * data[0][used])
+        alpha[side] = np.linalg.lstsq(columns / size, target)[0] / size
+    return alpha.T.ravel()
+
+
 def case(low, high, width, noise=0.3, logarithmic=False):
     rng = np.random.default_rng(1)
     speed = rng.uniform(low, high, SIZE)
@@ -86,6 +108,9 @@ def test_nodes_find_what_the_samples_find(name):
     np.testing.assert_allclose(reached, direct, rtol=1e-10)
     if name != "noise alone":  # there the cost is flat, and its minimum known to its root
         np.testing.assert_allclose(beta, wanted.beta, rtol=1e-8)
+    ours, exact = (curve(a, beta, data) for a in (found.alpha, least_squares(beta, data)))
+    np.testing.assert_allclose(ours, exact, atol=1e-9 * np.max(np.abs(data[1])))
+    assert wanted.alpha is None
     grid = np.geomspace(low, high, 128)
     assert np.all(reached <= np.min([cost((b, b), *data) for b in grid], axis=0) * (1 + 1e-12))
 
@@ -98,6 +123,9 @@ def test_beyond_the_range_of_the_panels_digits_go_gradually():
     np.testing.assert_allclose(found.beta, wanted.beta, rtol=1e-4)
     reached, direct = cost(found.beta, *data), cost(wanted.beta, *data)
     np.testing.assert_allclose(reached, direct, rtol=1e-9)
+    beta = np.asarray(found.beta)
+    ours, exact = (curve(a, beta, data) for a in (found.alpha, least_squares(beta, data)))
+    np.testing.assert_allclose(ours, exact, atol=1e-6 * np.max(np.abs(data[1])))
 
 
 def test_one_direction_alone():
@@ -107,6 +135,7 @@ def test_one_direction_alone():
     found, wanted = (searches(on)(*map(jnp.asarray, data), box) for on in (True, False))
     np.testing.assert_allclose(found.beta[0], wanted.beta[0], rtol=1e-8)
     assert np.all(np.isfinite(found.beta))
+    assert np.all(np.asarray(found.alpha).reshape(3, 2)[:, 1] == 0.0)
 
 
 def test_nodes_that_lie_are_found_out(monkeypatch):

@@ -219,6 +219,13 @@ def test_a_bump_is_one_at_rest_and_vanishes_at_speed(bump):
     assert bool(jnp.all(jnp.diff(force) < 0))
 
 
+@pytest.mark.parametrize("bump", BUMPS, ids=lambda t: type(t).__name__)
+def test_a_contrast_is_the_bump_over_its_value_at_the_slowest_speed(bump):
+    slowest, speed = jnp.asarray(0.02), jnp.geomspace(0.02, 3.0, 30)
+    expected = bump.shape(speed) / bump.shape(slowest) - 1
+    np.testing.assert_allclose(bump.contrast(speed, slowest), expected, atol=1e-14)
+
+
 def test_values_by_hand_at_the_stribeck_velocity():
     at = Recording(time=[0.0], force=[0.0], velocity=[0.3])
     by_hand = {Gaussian: np.exp(-1), Lorentzian: 0.5, Exponential: np.exp(-1)}

@@ -62,10 +62,10 @@ class AbstractBump(AbstractLaw):
 
     @abstractmethod
     def contrast(self, speed: Float[Array, "*n"], slowest: Float[Array, ""]) -> Float[Array, "*n"]:
-        """A function that spans with the constant what s spans with it; zero at `slowest` > 0.
+        """s(v)/s(v₀) − 1, with v₀ = `slowest` > 0: with the constant it spans what s spans.
 
-        It neither underflows where the bump is narrow nor loses its variation in the rounding of
-        a constant where the bump is wide. `speed` is not below `slowest`, both in m/s.
+        Written so that it neither underflows where the bump is narrow nor loses its variation in
+        the rounding of a constant where the bump is wide. `speed` is not below `slowest`, m/s.
         """
 
     def law(self, sample: Sample):
