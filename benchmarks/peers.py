@@ -90,7 +90,7 @@ def moment_costs(speed, force, root, betas):
     columns, slowest = jnp.stack([jnp.ones_like(speed), speed], axis=1), jnp.min(speed)
     rows = reduced.moments(columns, force, root[None, :])
     return reduced.grid_costs(
-        lambda b: Gaussian(stribeck_velocity=b[0]).contrast(speed, slowest), betas[:, None], rows
+        lambda b: Gaussian(stribeck_velocity=b[0]).ratio(speed, slowest), betas[:, None], rows
     )[0]
 
 

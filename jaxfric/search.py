@@ -262,7 +262,7 @@ def _grid_sides(sides, problem: _Problem, points):
             return rows.columns(bumps.with_beta(beta), recording)[:, 0]
 
         logarithmic = problem.logarithmic[:count]
-        both = Sides(values, rows.time, moments, problem.boxes, logarithmic, problem.alike)
+        both = Sides(values, values, rows.time, moments, problem.boxes, logarithmic, problem.alike)
         costs = both.costs(grid)
     starts, cells = jax.vmap(lambda c: _best(grid, c))(costs)
     # Shared terms tie the directions; then neither is a problem of its own.
@@ -287,9 +287,12 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
     def contrast(beta, speed):
         return bump.with_beta(beta).contrast(speed, slowest)
 
+    def ratio(beta, speed):
+        return bump.with_beta(beta).ratio(speed, slowest)
+
     def sides(places, moments):
         logarithmic = problem.logarithmic[: grid.shape[1]]
-        return Sides(contrast, places, moments, problem.boxes, logarithmic, problem.alike)
+        return Sides(contrast, ratio, places, moments, problem.boxes, logarithmic, problem.alike)
 
     if _straight(linear) and grid.shape[0] >= compress.LEAST_POINTS:
         # The first nonlinear parameter of a bump is its width.

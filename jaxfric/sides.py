@@ -12,10 +12,12 @@ from . import compress, reduced
 
 class Sides(NamedTuple):
     """One bump as a function of β and places, the places of the moments, and each direction's
-    bounds of β, `(2, 2, d)`; `alike`: whether these are known to be the same.
+    bounds of β, `(2, 2, d)`; `alike`: whether these are known to be the same. `coarse`: what the
+    grid takes for the bump.
     """
 
     bump: Callable[[Float[Array, " d"], Float[Array, " J"]], Float[Array, " J"]]
+    coarse: Callable[[Float[Array, " d"], Float[Array, " J"]], Float[Array, " J"]]
     places: Float[Array, " J"]
     moments: reduced.Moments
     boxes: Float[Array, "2 2 d"]
@@ -28,11 +30,15 @@ class Sides(NamedTuple):
 
     def costs(self, grid: Float[Array, "G d"]) -> Float[Array, "2 G"]:
         """The cost of each direction over its own bounds."""
+
+        def at(unit, box):
+            return self.coarse(reduced.decode(unit, box, self.logarithmic), self.places)
+
         if self.alike:  # the bumps of one serve both
-            return reduced.grid_costs(lambda unit: self.at(unit, self.boxes[0]), grid, self.moments)
+            return reduced.grid_costs(lambda unit: at(unit, self.boxes[0]), grid, self.moments)
 
         def side(rows, box):
-            return reduced.grid_costs(lambda unit: self.at(unit, box), grid, rows)[0]
+            return reduced.grid_costs(lambda unit: at(unit, box), grid, rows)[0]
 
         return reduced.each(side, self.moments, self.boxes)
 

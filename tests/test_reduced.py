@@ -74,17 +74,18 @@ def test_the_reduced_cost_is_the_least_squares_cost(name):
     np.testing.assert_allclose(found, reference(*case(name)[:5]), rtol=tolerance)
 
 
+@pytest.mark.parametrize("kind", ["contrast", "ratio"])
 @pytest.mark.parametrize("name", CASES)
-def test_the_grid_of_a_contrast_is_the_least_squares_cost(name):
+def test_the_grid_of_a_contrast_is_the_least_squares_cost(name, kind):
     velocity, force, weight, columns, betas, tolerance = case(name)
     roots = jnp.sqrt(jnp.asarray(np.stack([weight, np.flip(weight)])))
     rows = reduced.moments(jnp.asarray(columns), jnp.asarray(force), roots)
     slowest = jnp.min(jnp.asarray(velocity))
 
-    def contrast(beta):
-        return jf.terms.Gaussian(beta[0]).contrast(jnp.asarray(velocity), slowest)
+    def bump(beta):
+        return getattr(jf.terms.Gaussian(beta[0]), kind)(jnp.asarray(velocity), slowest)
 
-    found = reduced.grid_costs(contrast, jnp.asarray(betas)[:, None], rows)
+    found = reduced.grid_costs(bump, jnp.asarray(betas)[:, None], rows)
     for row, each in zip(found, (weight, np.flip(weight)), strict=True):
         exact = reference(velocity, force, each, columns, betas)
         np.testing.assert_allclose(row, exact, rtol=tolerance)

@@ -224,6 +224,7 @@ def test_a_contrast_is_the_bump_over_its_value_at_the_slowest_speed(bump):
     slowest, speed = jnp.asarray(0.02), jnp.geomspace(0.02, 3.0, 30)
     expected = bump.shape(speed) / bump.shape(slowest) - 1
     np.testing.assert_allclose(bump.contrast(speed, slowest), expected, atol=1e-14)
+    np.testing.assert_allclose(bump.ratio(speed, slowest), 1 + expected, atol=1e-14)
 
 
 def test_values_by_hand_at_the_stribeck_velocity():

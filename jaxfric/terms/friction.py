@@ -50,7 +50,8 @@ _STRIBECK_VELOCITY = Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds)
 class AbstractBump(AbstractLaw):
     """A Stribeck bump F = F_b sign(v) s(|v|), its shape s smooth at speeds above zero.
 
-    A concrete bump gives `shape`, and `contrast` for the search over β. Smooth means: at the
+    A concrete bump gives `shape`, and `contrast` for the search over β, whose grid is content with
+    `ratio`. Smooth means: at the
     scale of |v| itself or of the Stribeck velocity, whichever is larger.
     """
 
@@ -68,6 +69,10 @@ class AbstractBump(AbstractLaw):
         the rounding of a constant where the bump is wide. `speed` is not below `slowest`, m/s.
         """
 
+    def ratio(self, speed: Float[Array, "*n"], slowest: Float[Array, ""]) -> Float[Array, "*n"]:
+        """s(v)/s(v₀), for where the rounding of a constant does no harm."""
+        return 1 + self.contrast(speed, slowest)
+
     def law(self, sample: Sample):
         speed = jnp.abs(sample.velocity)
         moving = speed > 0
@@ -75,7 +80,22 @@ class AbstractBump(AbstractLaw):
         return (jnp.where(moving, jnp.sign(sample.velocity) * shape, jnp.zeros_like(shape)),)
 
 
-class Gaussian(AbstractBump):
+class AbstractExponentialBump(AbstractBump):
+    """A bump whose shape is an exponential; `fall` is its exponent less that at `slowest`."""
+
+    @abstractmethod
+    def fall(self, speed: Float[Array, "*n"], slowest: Float[Array, ""]) -> Float[Array, "*n"]:
+        """log(s(v)/s(v₀)), not by the difference of two exponents."""
+
+    def contrast(self, speed, slowest):
+        return jnp.expm1(self.fall(speed, slowest))
+
+    def ratio(self, speed, slowest):
+        # A third less than `expm1`.
+        return jnp.exp(self.fall(speed, slowest))
+
+
+class Gaussian(AbstractExponentialBump):
     """Stribeck bump F = F_b sign(v) exp(−(v/v_s)²) (Kim, Kim & Ha 2004, eq. 20).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
@@ -87,8 +107,8 @@ class Gaussian(AbstractBump):
     def shape(self, speed):
         return jnp.exp(-((speed / self.stribeck_velocity) ** 2))
 
-    def contrast(self, speed, slowest):
-        return jnp.expm1((slowest - speed) * (slowest + speed) / self.stribeck_velocity**2)
+    def fall(self, speed, slowest):
+        return (slowest - speed) * (slowest + speed) / self.stribeck_velocity**2
 
 
 class Lorentzian(AbstractBump):
@@ -107,7 +127,7 @@ class Lorentzian(AbstractBump):
         return (slowest - speed) * (slowest + speed) / (self.stribeck_velocity**2 + speed**2)
 
 
-class Exponential(AbstractBump):
+class Exponential(AbstractExponentialBump):
     """Stribeck bump F = F_b sign(v) exp(−|v|/v_s) (Tustin 1947).
 
     `stribeck_velocity` v_s, m/s, is nonlinear; NaN means "to be identified".
@@ -119,11 +139,11 @@ class Exponential(AbstractBump):
     def shape(self, speed):
         return jnp.exp(-speed / self.stribeck_velocity)
 
-    def contrast(self, speed, slowest):
-        return jnp.expm1((slowest - speed) / self.stribeck_velocity)
+    def fall(self, speed, slowest):
+        return (slowest - speed) / self.stribeck_velocity
 
 
-class Generalised(AbstractBump):
+class Generalised(AbstractExponentialBump):
     """Stribeck bump F = F_b sign(v) exp(−|v/v_s|^δ) (Bo & Pavelescu 1982; δ from 1/2 to 2).
 
     `stribeck_velocity` v_s, m/s, and `stribeck_exponent` δ are nonlinear; NaN means "to be
@@ -140,10 +160,9 @@ class Generalised(AbstractBump):
     def shape(self, speed):
         return jnp.exp(-self._power(speed / self.stribeck_velocity))
 
-    def contrast(self, speed, slowest):
-        # (v/v_s)^δ − (v₀/v_s)^δ, without taking the difference of two powers.
+    def fall(self, speed, slowest):
         rise = jnp.expm1(self.stribeck_exponent * jnp.log1p((speed - slowest) / slowest))
-        return jnp.expm1(-self._power(slowest / self.stribeck_velocity) * rise)
+        return -self._power(slowest / self.stribeck_velocity) * rise
 
     def _power(self, ratio):
         # jnp.power is an order of magnitude slower.
