@@ -145,20 +145,15 @@ def _refine(problem: _Problem, best: _Best):
     start = best.start.reshape(2, -1)
     unit, converged = best.sides.refined(start, best.cell.reshape(2, -1))
     if best.samples is not None:
-        eps = jnp.finfo(unit.dtype).eps
-        after = best.sides.check(unit[:, None], best.samples)[:, 0]
-        off = jnp.abs(best.sides.gains(unit[:, None])[:, 0] - after)
-        # Nodes that are off by half the digits do not stand for these samples; those that are exact
-        # know that the refinement has not lost what the grid had.
-        whole = best.sides.moments.whole
-        true, exact = off <= eps**0.5 * whole, jnp.all(off <= EXACT * eps * whole)
-
-        def better():
-            before = best.sides.check(start[:, None], best.samples)[:, 0]
-            return after >= before * (1 - EXACT * eps)
-
-        fine = jax.lax.cond(exact, lambda: jnp.ones(2, bool), better)
-        unit, converged = jnp.where(fine[:, None], unit, start), converged & fine & true
+        eps, whole = jnp.finfo(unit.dtype).eps, best.sides.moments.whole
+        before, after = best.sides.gains(jnp.stack([start, unit], axis=1)).T
+        off = jnp.abs(best.sides.check(unit[:, None], best.samples)[:, 0] - after)
+        # What the refinement has gained stands out of what the nodes are off by, at either point,
+        # or of nothing at all; and nodes that are off by half the digits do not stand for these
+        # samples.
+        fine = (after - before >= 2 * off) | (off <= EXACT * eps * whole)
+        unit = jnp.where(fine[:, None], unit, start)
+        converged = converged & fine & (off <= eps**0.5 * whole)
     return unit.reshape(-1), jnp.all(converged)
 
 

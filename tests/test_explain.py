@@ -163,6 +163,15 @@ def test_a_wrong_value_is_told_from_missing_physics(healthy):
     assert right.verdict == "consistent"
 
 
+def test_values_that_are_right_stay_as_given_and_findings_are_still_verified(healthy):
+    model = models.from_parameters(models.gaussian(), PARAMETERS)
+    first, second = (planted(run, *CASES["cogging"]) for run in healthy)
+    found = explain(first, model, second, fixed=True)
+    assert [f.effect for f in found.findings] == ["cogging"]
+    assert found.model.parameters.items() >= PARAMETERS.items()
+    assert explain(first, model, healthy[1], fixed=True).findings == []
+
+
 @pytest.mark.slow
 def test_another_simulator_is_compared_without_a_model(healthy):
     x, v = set_point(0)

@@ -13,7 +13,7 @@ from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
-from .regression import Fit
+from .regression import Fit, fit
 
 
 class Baseline(NamedTuple):
@@ -72,6 +72,26 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     columns = seen.columns(term, beta[None])[0]
     left = evidence.target - columns @ alpha
     return start._replace(columns=columns, residual=left, energy=float(left @ left))
+
+
+def as_given(model: Model, now: Fit, evidence: Evidence) -> Fit:
+    """A fit with its base, the first term, at the model's own values, the others fitted beside.
+
+    The derivatives are those of all parameters, which say what these values are worth.
+    """
+    given, others = at_values(model, evidence), now.terms[1:]
+    for _ in range(2):  # some terms act on what the others predict
+        seen = with_predictions(evidence, now)
+        beside = seen._replace(target=given.residual)
+        rest = fit(others, beside, now.betas[1:], 6) if others else given.only([])
+        betas = (*given.betas, *rest.betas)
+        now = fit(now.terms, seen, betas, 0)._replace(
+            betas=betas,
+            alphas=(*given.alphas, *rest.alphas),
+            residual=rest.residual,
+            energy=rest.energy,
+        )
+    return now
 
 
 def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:

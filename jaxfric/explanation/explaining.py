@@ -13,7 +13,7 @@ from ..models import Model, named
 from ..recording import Recording
 from ..terms.base import AbstractTerm
 from . import verification
-from .baseline import Baseline, at_values, baseline_of, mismatch, simulated
+from .baseline import Baseline, as_given, baseline_of, mismatch, simulated
 from .candidates import OF_THE_MOMENT
 from .contest import contest
 from .explained import Explanation
@@ -78,7 +78,8 @@ def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: in
     if known.model is not None:
         wrong = mismatch(known.model, asked.base, asked.evidence, seed)
         if wrong is None and fixed:
-            asked, found = rest = _as_given(known, asked, seed)
+            found = _as_given(known.model, found, asked)
+            rest = rest[0], _as_given(known.model, rest[1], rest[0])
     explanation = tell(recording, asked, found, rest, known, wrong, seed)
     if simulate:
         models = {"before": explanation.baseline, "after": explanation.model}
@@ -119,14 +120,10 @@ def _known(baseline, seed: int) -> Baseline:
     return baseline_of(baseline)
 
 
-def _as_given(known: Baseline, asked: Question, seed) -> tuple[Question, Named]:
-    """The search with the baseline's own values, which nothing on the recording contradicts."""
-    start = None
-    if asked.within is not None:
-        within, start = _as_given(known, asked.within, seed)
-        asked = asked._replace(within=within)
-    asked = asked._replace(base=at_values(known.model, asked.evidence))
-    return asked, _sought(asked, seed, start=start)
+def _as_given(model: Model, found: Named, asked: Question) -> Named:
+    """The findings beside the baseline's own values, which nothing on the recording contradicts."""
+    base, last = (as_given(model, now, asked.evidence) for now in (found.base, found.last))
+    return found._replace(base=base, last=last)
 
 
 def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
