@@ -169,6 +169,10 @@ def test_values_that_are_right_stay_as_given_and_findings_are_still_verified(hea
     found = explain(first, model, second, fixed=True)
     assert [f.effect for f in found.findings] == ["cogging"]
     assert found.model.parameters.items() >= PARAMETERS.items()
+    (finding,) = found.findings
+    assert finding.share == pytest.approx(
+        1 - (found.fit["force_error"]["after"] / found.fit["force_error"]["before"]) ** 2
+    )
     assert explain(first, model, healthy[1], fixed=True).findings == []
 
 

@@ -123,7 +123,7 @@ def _known(baseline, seed: int) -> Baseline:
 def _as_given(model: Model, found: Named, asked: Question) -> Named:
     """The findings beside the baseline's own values, which nothing on the recording contradicts."""
     base, last = (as_given(model, now, asked.evidence) for now in (found.base, found.last))
-    return found._replace(base=base, last=last)
+    return found._replace(base=base, last=last, given=model)
 
 
 def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:

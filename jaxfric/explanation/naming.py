@@ -7,6 +7,7 @@ import jax
 import numpy as np
 
 from ..catalogue import Effect
+from ..models import Model
 from ..terms import Compliance, DryCompliance, ElasticBacklash
 from .candidates import OF_THE_MOMENT, Candidate, Field
 from .chance import DRAWS, LEVEL
@@ -53,7 +54,7 @@ class Named(NamedTuple):
     `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
     contest for what remains; `smoothed`: what kernel and sampling make of the time by which the
     force is late, where it is, s; `start`: what rows without reversals had shown, where these reach
-    across them.
+    across them; `given`: the base with its own values, where these are kept.
     """
 
     base: Fit
@@ -62,6 +63,7 @@ class Named(NamedTuple):
     left: Contest
     smoothed: float = 0.0
     start: "Named | None" = None
+    given: Model | None = None
 
     @property
     def rephased(self) -> frozenset[int]:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .. import terms as laws
+from .baseline import as_given
 from .contest import Contest
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Named
@@ -76,8 +77,9 @@ def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) 
 
 
 def lacking(named: Named, evidence: Evidence, number: int) -> Fit:
-    """The model refitted without the found term of that number."""
-    return without(named.last, evidence, len(named.last.terms) - len(named.taken) + number)
+    """The model refitted without the found term of that number; the base where it is not kept."""
+    less = without(named.last, evidence, len(named.last.terms) - len(named.taken) + number)
+    return less if named.given is None else as_given(named.given, less, evidence)
 
 
 def share(
