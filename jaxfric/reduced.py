@@ -111,6 +111,12 @@ def _basis(columns) -> _Basis:
     Fukaya et al. 2020).
     """
 
+    if columns.shape[1] == 1:
+        square = jnp.sum(columns**2)
+        there = square > 0
+        scale = jnp.where(there, 1 / jnp.sqrt(jnp.where(there, square, 1.0)), 0.0)
+        return _Basis(columns, jnp.ones((1, 1), columns.dtype), scale[None, None])
+
     def slow():
         basis, matrix = gram_schmidt(columns)
         return _Basis(basis, matrix, jnp.eye(columns.shape[1], dtype=columns.dtype))
