@@ -110,7 +110,6 @@ def _basis(columns) -> _Basis:
     is left to do to those loses nothing in the product QᵀQ (a Cholesky QR with a preconditioner;
     Fukaya et al. 2020).
     """
-
     if columns.shape[1] == 1:
         square = jnp.sum(columns**2)
         there = square > 0

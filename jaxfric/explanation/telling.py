@@ -60,11 +60,13 @@ def tell(
     drawn = curves(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
+    errors = _errors(asked, first, *rest)
+    rough = _rough(errors, frozenset(taken.trial.candidate.effect.name for taken in found.taken))
     return Explanation(
-        verdict=_verdict(findings, before, after, _rough(*rest, found), standing),
+        verdict=_verdict(findings, before, after, rough, standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
-        fit=_errors(asked, first, *rest),
+        fit=errors,
         not_visible=_not_visible(found, units),
         model=models[1],
         baseline=models[0],
@@ -128,15 +130,23 @@ def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
 ROUGH = 4.0
 # Where the findings leave half of the mismatch's size, a quarter of its power, less will do: more
 # than half as much again as that noise in power.
-HALF_ROUGH, QUARTER = 1.25, 0.25
+HALF_ROUGH, HALF = 1.25, 0.5
 
 
-def _rough(asked: Question, left: Named, found: Named) -> bool:
-    """Whether what is left is far from the noise that neighbouring rows show, or much of it all."""
-    error = verification.error(left.last, asked.evidence)
-    floor = verification.noise(left.last, asked.evidence.target)
-    much = bool(found.taken) and left.last.energy > QUARTER * found.base.energy
-    return error > (HALF_ROUGH if much else ROUGH) * floor and error > LINEARITY
+def _rough(fit: dict[str, Any], named: frozenset[str]) -> bool:
+    """Whether what is left is far from the noise that neighbouring rows show, or much of it all.
+
+    What is `named` has to explain the held-out recording as well, unless it belongs to a moment;
+    where nothing is, any base that has to extrapolate may miss that by more.
+    """
+    here, held = fit["force_error"], fit["holdout_force_error"]
+    both = held is not None and named and not named & OF_THE_MOMENT
+    for view in (here, held) if both else (here,):
+        much = named and view["after"] > HALF * view["before"]
+        size = HALF_ROUGH if much else ROUGH if view is here else np.inf
+        if view["after"] > max(size * fit["noise_floor"], LINEARITY):
+            return True
+    return False
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
