@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import PD, Encoder, Recording, models, simulate, terms
+from jaxfric import PD, Encoder, Recording, concealed, models, simulate, terms
 from jaxfric.effects import EFFECTS
 from jaxfric.explanation import (
     candidates,
@@ -622,6 +622,43 @@ def test_what_was_refuted_is_not_named_again(healthy):
     assert not list(explaining._refuted(plain, plain, asked))
 
 
+@pytest.mark.parametrize(("error", "taken"), [(0.4, True), (0.6, False)])
+def test_beside_what_hardly_shows_here_a_refuted_finding_may_hold(monkeypatch, error, taken):
+    def found(error, *names):
+        return types.SimpleNamespace(names=frozenset(names), error=error, start=None)
+
+    first, left, more = found(2.0, "a"), found(1.0), found(error, "a", "b")
+    asked = types.SimpleNamespace(held=True)
+    monkeypatch.setattr(explaining, "pursue", lambda *_: (asked, first))
+    monkeypatch.setattr(explaining, "_check_signals", lambda *_: None)
+    monkeypatch.setattr(explaining, "_verified", lambda now, *_: left if now is first else now)
+    monkeypatch.setattr(explaining, "_names", lambda now: now.names)
+    monkeypatch.setattr(explaining, "_error", lambda now, _: now.error)
+    monkeypatch.setattr(explaining, "_refuted", lambda *_: iter([frozenset({"a"})]))
+    parts = []
+
+    def sought(asked, seed, gone, start, part):
+        parts.append((gone, part))
+        return left if gone else more
+
+    monkeypatch.setattr(explaining, "_sought", sought)
+    assert explaining._proved(None, None, None, 0)[1] is (more if taken else left)
+    assert parts[0] == (frozenset(), naming.LATER_SHARE)
+    assert len(parts) == (1 if taken else 2)
+
+
+@pytest.mark.slow
+def test_another_motion_shows_what_this_one_hides():
+    """Drag that bends the held-out force hides there what repeats along the stroke in both."""
+    names = "viscous_nonlinearity", "position_dependent_friction"
+    machine = concealed.draw(331507353, names, (0.02, 0.3))
+    run = concealed.record(machine)
+    found = explain(run.recording, machine.baseline, run.holdout)
+    assert {finding.effect for finding in found.findings} == set(names)
+    errors = found.fit["holdout_force_error"]
+    assert errors["after"] < 0.1 * errors["before"]
+
+
 def beside(asked, term):
     """A search that has found that term, fitted beside the base, and what it is taken to be."""
     betas = (*asked.base.betas, np.asarray(term.beta()))
@@ -769,5 +806,5 @@ def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch
         assert explaining._holds(less, found, asked, frozenset()) is holds
     # And the search lets in a third of the rest only where that will be asked.
     effects = EFFECTS["spring"], [EFFECTS["cogging"]]
-    for judged, least in ((False, 1.5), (True, 1.0)):
-        assert naming.least_gain(*effects, 1000.0, 3.0, judged) == pytest.approx(least)
+    for part, least in ((naming.MOST, 1.5), (naming.MOST_JUDGED, 1.0)):
+        assert naming.least_gain(*effects, 1000.0, 3.0, part) == pytest.approx(least)

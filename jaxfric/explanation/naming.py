@@ -81,6 +81,7 @@ def search(
     refuted: frozenset[Hashable] = frozenset(),
     start: Named | None = None,
     judged: bool = False,
+    part: float | None = None,
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
@@ -88,8 +89,10 @@ def search(
     terms that act on derivatives of the force must show alike; `refuted`: [`marks`][] of what is
     out of question; `start`: what the rows without reversals have shown, where these reach across
     them. Then only what acts there is looked for: all else has been, where nothing of that hides
-    it. `judged`: whether a held-out recording will judge what is found.
+    it. `judged`: whether a held-out recording will judge what is found; `part` of the rest that is
+    asked of a later term, if another than usual.
     """
+    part = part or (MOST_JUDGED if judged else MOST)
     now, taken, among, kept = base, list[Taken](), frozenset[str](), 0
     evidence = with_predictions(evidence, now)
     if start is not None:
@@ -103,7 +106,7 @@ def search(
         round_ = contest(evidence, now, field, seed, among)
         open_ = [f for f in round_.finalists if not marks(f.trial.candidate) & refuted]
         round_ = machines(round_._replace(finalists=open_), now, evidence)
-        best = _believed(round_, now, evidence, wider, base, taken, judged)
+        best = _believed(round_, now, evidence, wider, base, taken, judged, part)
         # Two terms that make each other idle would take turns for ever.
         names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
         if best is None or len(taken) >= MOST_TERMS or names in visited:
@@ -217,7 +220,9 @@ REVERSAL_OF_BASE = 0.25
 NEARLY_ALL = 0.75
 
 
-def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken], judged):
+def _believed(
+    round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken], judged, part: float
+):
     least = LATER_SHARE if taken else LEAST_SHARE
     force = float(evidence.target @ evidence.target)
     before = [t.trial.candidate.effect for t in taken]
@@ -232,7 +237,7 @@ def _believed(round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list
             # Every axis has a load that wanders; no larger than the noise it is a part of it.
             enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
-            enough &= gained >= least_gain(effect, before, base.energy, now.energy, judged)
+            enough &= gained >= least_gain(effect, before, base.energy, now.energy, part)
             enough &= not _again(finalist, taken)
         sharp = effect.name in SHARP
         dynamic = isinstance(candidate.term, ElasticBacklash)
@@ -250,13 +255,13 @@ def least_gain(
     before: Sequence[Effect],
     base: float,
     left: float,
-    judged: bool = False,
+    part: float = MOST,
     floor: float = LEAST_OF_BASE,
 ) -> float:
     """The energy that a term after others must account for, N².
 
     **Arguments:** `before`: the effects taken already; `base` and `left`: the energy that the base
-    left, and that they leave; `judged`: whether a held-out recording will judge the term;
+    left, and that they leave; `part` of the latter that is much;
     `floor`: the least part of the base's.
     """
     again = any(earlier.name in AT_REVERSALS for earlier in before)
@@ -264,7 +269,7 @@ def least_gain(
         return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
     if effect.name in EASY:
         return min(EASY_OF_BASE * base, NEARLY_ALL * left)
-    return max(floor * base, min(OF_BASE * base, (MOST_JUDGED if judged else MOST) * left))
+    return max(floor * base, min(OF_BASE * base, part * left))
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:

@@ -21,7 +21,7 @@ from .candidates import Candidate
 from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial
 from .evidence import gather
-from .naming import Named, Taken, least_gain
+from .naming import MOST, MOST_JUDGED, Named, Taken, least_gain
 from .predictions import with_predictions
 from .question import Question, from_position
 from .regression import Fit, fast, fit, without
@@ -223,8 +223,8 @@ def settled(
         # As for any later term, but that an undone delay leaves nothing of its own.
         before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
         effect = others[number].trial.candidate.effect
-        judged = there.held is not None
-        least = least_gain(effect, before, found.base.energy, less.energy, judged, 0.0)
+        part = MOST if there.held is None else MOST_JUDGED
+        least = least_gain(effect, before, found.base.energy, less.energy, part, 0.0)
         if less.energy - left.energy < least:
             left, others = less, [t for i, t in enumerate(others) if i != number]
     evidence = with_predictions(asked.evidence, left)
