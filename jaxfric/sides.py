@@ -74,7 +74,8 @@ class Sides(NamedTuple):
     ) -> Float[Array, "2 3"]:
         """Constant, N, slope, N·s/m, and height of the bump, N, of each direction's best fit.
 
-        `most`: the bump's values at the slowest speed; over them, less one, it is `bump` here.
+        **Arguments:** `unit`, a point of each unit cube; `most`, the bump's values at the slowest
+        speed, of which `bump` here is the ratio less one; `samples` that the places stand for.
         """
 
         def side(item):

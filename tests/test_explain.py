@@ -632,7 +632,6 @@ def test_beside_what_hardly_shows_here_a_refuted_finding_may_hold(monkeypatch, e
     monkeypatch.setattr(explaining, "pursue", lambda *_: (asked, first))
     monkeypatch.setattr(explaining, "_check_signals", lambda *_: None)
     monkeypatch.setattr(explaining, "_verified", lambda now, *_: left if now is first else now)
-    monkeypatch.setattr(explaining, "_names", lambda now: now.names)
     monkeypatch.setattr(explaining, "_error", lambda now, _: now.error)
     monkeypatch.setattr(explaining, "_refuted", lambda *_: iter([frozenset({"a"})]))
     parts = []
@@ -681,7 +680,7 @@ def test_where_a_load_has_no_inertia_other_effects_are_asked(healthy, monkeypatc
     run = planted(healthy[0], *CASES["cogging"])
     monkeypatch.setattr(explaining, "weightless", lambda found, _: iter(range(len(found.taken))))
     asked, found = explaining._proved(run, None, models.named("gaussian"), 0)
-    assert "cogging" not in explaining._names(found)
+    assert "cogging" not in found.names
     assert found.left.trials and len(found.last.terms) == 1 + len(found.taken)
 
 

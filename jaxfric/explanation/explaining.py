@@ -154,7 +154,7 @@ def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question,
         _check_signals(again, recording, holdout)
         again = _verified(again, asked, seed)
         better = _error(again, asked) < enough * _error(found, asked)
-        if _names(again) > _names(found) and better:
+        if again.names > found.names and better:
             return asked, again
     return asked, found
 
@@ -167,7 +167,7 @@ HALVED = 0.5
 
 def _refuted(first: Named, found: Named, asked: Question) -> Iterator[frozenset[Hashable]]:
     """Marks of what did not hold of the first: its forms, where others are; its effects."""
-    names = _names(first) - _names(found)
+    names = first.names - found.names
     gone = [t.trial.candidate for t in first.taken if t.trial.candidate.effect.name in names]
     forms = frozenset[Hashable]().union(*map(marks, gone)) - names
     others = [c for c in asked.field.candidates if c.effect.name in names and not marks(c) & forms]
@@ -191,10 +191,6 @@ def _check_signals(found: Named, recording, holdout) -> None:
                 f"{recording.source or 'the recording'} shows {effect}, so that this cannot be "
                 "judged there. Add the signal, or explain without a held-out recording."
             )
-
-
-def _names(found: Named) -> frozenset[str]:
-    return frozenset(taken.trial.candidate.effect.name for taken in found.taken)
 
 
 def pursue(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:

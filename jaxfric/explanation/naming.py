@@ -66,6 +66,11 @@ class Named(NamedTuple):
     given: Model | None = None
 
     @property
+    def names(self) -> frozenset[str]:
+        """The effects that were found."""
+        return frozenset(taken.trial.candidate.effect.name for taken in self.taken)
+
+    @property
     def rephased(self) -> frozenset[int]:
         """Numbers of the terms that need another phase on the held-out recording."""
         start = len(self.last.terms) - len(self.taken)

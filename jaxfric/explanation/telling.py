@@ -61,9 +61,8 @@ def tell(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
     errors = _errors(asked, first, *rest)
-    rough = _rough(errors, frozenset(taken.trial.candidate.effect.name for taken in found.taken))
     return Explanation(
-        verdict=_verdict(findings, before, after, rough, standing),
+        verdict=_verdict(findings, before, after, _rough(errors, found.names), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=errors,
@@ -140,13 +139,16 @@ def _rough(fit: dict[str, Any], named: frozenset[str]) -> bool:
     where nothing is, any base that has to extrapolate may miss that by more.
     """
     here, held = fit["force_error"], fit["holdout_force_error"]
-    both = held is not None and named and not named & OF_THE_MOMENT
-    for view in (here, held) if both else (here,):
-        much = named and view["after"] > HALF * view["before"]
-        size = HALF_ROUGH if much else ROUGH if view is here else np.inf
-        if view["after"] > max(size * fit["noise_floor"], LINEARITY):
-            return True
-    return False
+
+    def above(view, size: float) -> bool:
+        return view["after"] > max(size * fit["noise_floor"], LINEARITY)
+
+    lasting = held is not None and not named & OF_THE_MOMENT
+    much = any(
+        view["after"] > HALF * view["before"] and above(view, HALF_ROUGH)
+        for view in ((here, held) if lasting else (here,))
+    )
+    return above(here, ROUGH) or bool(named) and much
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
@@ -288,12 +290,11 @@ def _errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[s
 
 
 def _not_visible(found: Named, units) -> list[dict[str, Any]]:
-    names = {taken.trial.candidate.effect.name for taken in found.taken}
     sizes = verification.smallest_visible(found.left, found.last)
     return [
         {"effect": effect, "smallest_detectable": float(size), "unit": units["force"]}
         for effect, size in sorted(sizes.items(), key=lambda item: item[1])
-        if effect not in names
+        if effect not in found.names
     ]
 
 

@@ -51,8 +51,8 @@ class AbstractBump(AbstractLaw):
     """A Stribeck bump F = F_b sign(v) s(|v|), its shape s smooth at speeds above zero.
 
     A concrete bump gives `shape`, and `contrast` for the search over β, whose grid is content with
-    `ratio`. Smooth means: at the
-    scale of |v| itself or of the Stribeck velocity, whichever is larger.
+    `ratio`. Smooth means: at the scale of |v| itself or of the Stribeck velocity, whichever is
+    larger.
     """
 
     affine: ClassVar = _STRIBECK_FORCE
@@ -91,7 +91,7 @@ class AbstractExponentialBump(AbstractBump):
         return jnp.expm1(self.fall(speed, slowest))
 
     def ratio(self, speed, slowest):
-        # A third less than `expm1`.
+        # A third cheaper than `expm1`.
         return jnp.exp(self.fall(speed, slowest))
 
 
