@@ -90,7 +90,7 @@ def batch():
     stacked = [jax.tree.map(lambda *x: jnp.stack(x), *(p[i] for p in problems)) for i in (1, 2, 3)]
 
     def fits(*rows):
-        return jax.lax.map(lambda row: peers.jaxfric_fit(term, *row)[:2], rows, batch_size=16)
+        return jax.lax.map(lambda row: peers.jaxfric_fit(term, *row)[:2], rows, batch_size=8)
 
     program, ours = compiled(fits, *stacked)
     sides = [list(peers.directions(*p[1:3])) for p in problems]

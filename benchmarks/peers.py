@@ -65,6 +65,8 @@ def directions(ready, rows):
 def jaxfric_fit(term, ready, rows, box, grid=None):
     """Grid, refinement and affine parameters in one program."""
     found = search(term, ready, rows, box, grid, True)
+    if found.minimum is not None:
+        return found.minimum, found.beta, found.alpha
     alpha, _, left = _solve(term, found.beta, ready, rows, found.alpha)
     weight = rows.positive + rows.negative
     return jnp.sum(weight * left**2), found.beta, alpha

@@ -11,20 +11,25 @@ from collections.abc import Callable
 from functools import cache
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from .reduced import PLACES, Moments, taken_off
+from .reduced import PLACES, Moments
 
 # A polynomial through 20 points carries exp(−v²) over an octave to rounding.
 ORDER = 20
+# Through 10 it carries it to 1e-7 or so, by which the places of a grid are told as well.
+FEWER = 8
 # 13 octaves from the finest panel to the fastest speed: a ratio of 8000.
 PANELS = 13
 # Samples are summed over pieces of a panel first. What 20 polynomials carry over a panel, 6 carry
 # over a 64th of it (each is worth a factor of some 2 · 64), and a sample adds to fewer sums.
 PIECES = 64
 PIECE_ORDER = 6
+# Samples whose polynomials are written down together: they fit into the cache, whatever else does.
+TOGETHER = 8192
 # The passes over the samples cost about as much as 10 bumps, and the refinement evaluates 30 more;
 # on short recordings smaller grids are not worth it.
 LEAST_POINTS = 100
@@ -46,9 +51,9 @@ def edges(
     return slowest + span * jnp.expm1(growth * steps) / jnp.expm1(growth * PANELS)
 
 
-def nodes(panels: Float[Array, " P+1"]) -> Float[Array, " M"]:
-    """The Chebyshev points of all panels, m/s, `(PANELS·ORDER,)`."""
-    places = jnp.asarray(_points(), panels.dtype)
+def nodes(panels: Float[Array, " P+1"], order: int = ORDER) -> Float[Array, " M"]:
+    """The Chebyshev points of all panels, m/s, `(PANELS·order,)`."""
+    places = jnp.asarray(_points(order), panels.dtype)
     low, high = panels[:-1, None], panels[1:, None]
     return (0.5 * (low + high) + 0.5 * (high - low) * places[None, :]).reshape(-1)
 
@@ -64,16 +69,25 @@ def compress(
     **Arguments:** `speed`, m/s; `side`, 0 or 1, the sum that a sample goes into; `values`, what f
     is summed with, zero for samples out of the panels; `panels`, from [`edges`][].
     """
-    panel = jnp.searchsorted(panels, speed, side="right", method="compare_all") - 1
-    panel = jnp.clip(panel, 0, PANELS - 1).astype(side.dtype)
-    scale = PIECES / jnp.diff(panels)
-    place = jnp.clip((speed - panels[panel]) * scale[panel], 0.0, PIECES)
-    whole = jnp.minimum(jnp.floor(place), PIECES - 1)
-    powers = _polynomials(2 * (place - whole) - 1, PIECE_ORDER)
-    items = jnp.concatenate([x[:, None] * powers for x in values], axis=1)
-    empty = jnp.zeros((2 * PANELS * PIECES, items.shape[1]), speed.dtype)
-    piece = (side * PANELS + panel) * PIECES + whole.astype(side.dtype)
-    sums = empty.at[piece].add(items)
+
+    def add(sums, samples):
+        speed, side, values = samples
+        panel = jnp.searchsorted(panels, speed, side="right", method="compare_all") - 1
+        panel = jnp.clip(panel, 0, PANELS - 1).astype(side.dtype)
+        scale = PIECES / jnp.diff(panels)
+        place = jnp.clip((speed - panels[panel]) * scale[panel], 0.0, PIECES)
+        whole = jnp.minimum(jnp.floor(place), PIECES - 1)
+        powers = _polynomials(2 * (place - whole) - 1, PIECE_ORDER)
+        items = jnp.concatenate([x[:, None] * powers for x in values], axis=1)
+        piece = (side * PANELS + panel) * PIECES + whole.astype(side.dtype)
+        return sums.at[piece].add(items), None
+
+    sums = jnp.zeros((2 * PANELS * PIECES, len(values) * PIECE_ORDER), speed.dtype)
+    whole = len(speed) // TOGETHER * TOGETHER
+    if whole:
+        parts = [x[..., :whole].reshape(*x.shape[:-1], -1, TOGETHER) for x in (speed, side, values)]
+        sums, _ = jax.lax.scan(add, sums, (*parts[:2], jnp.moveaxis(parts[2], 1, 0)))
+    sums, _ = add(sums, (speed[whole:], side[whole:], values[:, whole:]))
     sums = sums.reshape(2, PANELS, PIECES, len(values), PIECE_ORDER)
     spread = jnp.asarray(_from_pieces(), speed.dtype)
     return jnp.einsum("spikl,ilm->skpm", sums, spread).reshape(2, len(values), -1)
@@ -117,42 +131,39 @@ def orthonormal_lines(speed: Float[Array, " n"], weights: Float[Array, "2 n"]) -
 class Straightened(eqx.Module):
     """Samples of two directions, the best straight line of each taken off the force.
 
-    `speed`, m/s, `side`, 0 or 1, the direction, `weight`, s, and the `force` left, N, all `(N,)`;
-    `lines`, orthonormal over the samples of each direction; `taken`, constant, N, and slope, N·s/m,
-    of what was taken off; `slowest` speed, m/s.
+    `speed`, m/s, `side`, 0 or 1, the direction, `weight`, s, and `force`, N, all `(N,)`, from
+    which the line `rest` is still to be taken; `lines`, orthonormal over the samples of each
+    direction; `taken`, all that is taken off. Lines are constant, N, and slope, N·s/m, `(2, 2)`;
+    `slowest` speed, m/s.
     """
 
     speed: Float[Array, " N"]
     side: Int[Array, " N"]
     weight: Float[Array, " N"]
     force: Float[Array, " N"]
+    rest: Float[Array, "2 2"]
     lines: Lines
     taken: Float[Array, "2 2"]
     slowest: Float[Array, ""]
 
-    def gains(
+    def gained(
         self,
-        bumps: Callable[[Float[Array, " n"], Int[Array, " n"]], Float[Array, "k n"]],
-        shares: Float[Array, "2 2 k"],
-    ) -> Float[Array, "2 k"]:
-        """What bumps take off the cost, as [`Moments.gains`][jaxfric.reduced.Moments.gains], N²·s.
+        bump: Callable[[Float[Array, " N"], Int[Array, " N"]], Float[Array, " N"]],
+        height: Float[Array, " 2"],
+        line: Float[Array, "2 2"],
+    ) -> Float[Array, ""]:
+        """What bumps of that height, N, less a line each, take off both directions' cost, N²·s.
 
-        **Arguments:** `bumps`, of speeds and directions; `shares`, about what each direction's
-        lines have in each bump: taken off first, for rounding.
+        At the best height and line that is [`Moments.gains`][jaxfric.reduced.Moments.gains],
+        summed over the directions. **Arguments:** `bump`, of speeds and directions.
         """
-        lines, share = self.lines.of(self.speed, self.side), _of(self.side, shares)
-        left = bumps(self.speed, self.side)
-        left = left - share[0] * lines[0][None, :] - share[1] * lines[1][None, :]
-        weights = [jnp.where(self.side == i, self.weight, 0.0) for i in range(2)]
+        left = self.force - self._at(self.rest)
+        law = _of(self.side, height) * bump(self.speed, self.side) - self._at(line)
+        return (self.weight * law) @ (2 * left - law)
 
-        def total(values):
-            # Sums over all samples one by one: XLA does each in one pass, without a copy.
-            return jnp.stack([jnp.stack([jnp.sum(w * x) for x in values]) for w in weights])
-
-        first, second, along = (total(left * x[None, :]) for x in (*lines, self.force))
-        size = total(left**2)
-        most = size + jnp.sum(shares**2, axis=1)
-        return taken_off(along, size, first**2 + second**2, most)
+    def _at(self, line):
+        first, second = _of(self.side, line)
+        return first + second * self.speed
 
 
 def compressed(
@@ -180,14 +191,32 @@ def compressed(
     lines = orthonormal_lines(places, few)
     values = lines(places)
     taken, share = rough.straight(share), _shares(values, loads)
-    force, taken = force - _line(lines, share, speed, side), taken + lines.straight(share)
+    rest, whole = lines.straight(share), weights @ force**2 - jnp.sum(share**2, axis=1)
     along = values * few[:, None, :]
     loads = loads - jnp.sum(share[:, :, None] * along, axis=1)
     against = jnp.concatenate([along, loads[:, None, :]], axis=1)
-    total = jnp.sum(few, axis=0)
+    whole = jnp.maximum(whole, 0.0)  # rounding, where the force is a line
+    moments = _moments(places, against, few, whole)
+    samples = Straightened(speed, side, weight, force, rest, lines, taken + rest, panels[0])
+    return moments, samples
+
+
+def fewer(rows: Moments, panels: Float[Array, " P+1"]) -> tuple[Float[Array, " M"], Moments]:
+    """Fewer nodes, m/s, and the moments there, good for the grid: half of its time."""
+    matrix = jnp.asarray(_to_fewer(), panels.dtype)
+
+    def moved(values):
+        parts = values.reshape(*values.shape[:-1], PANELS, ORDER) @ matrix
+        return parts.reshape(*values.shape[:-1], -1)
+
+    places = nodes(panels, FEWER)
+    return places, _moments(places, moved(rows.against), moved(rows.weights), rows.whole)
+
+
+def _moments(places, against, weights, whole) -> Moments:
+    total = jnp.sum(weights, axis=0)
     shared = orthonormal_lines(places, total[None])(places)[0].T
-    moments = Moments(shared, total[:, None] * shared, against, few, weights @ force**2)
-    return moments, Straightened(speed, side, weight, force, lines, taken, panels[0])
+    return Moments(shared, total[:, None] * shared, against, weights, whole)
 
 
 def _shares(lines, loads):
@@ -214,22 +243,29 @@ def _points(order=ORDER):
     return np.cos(np.pi * (np.arange(order) + 0.5) / order)
 
 
+def _transform(order):
+    """From values at the Chebyshev points to coefficients: the discrete cosine transform."""
+    matrix = np.cos(np.arange(order)[:, None] * np.arccos(_points(order))) * 2 / order
+    matrix[0] /= 2
+    return matrix
+
+
+@cache
+def _to_fewer():
+    """Lagrange polynomials through the fewer points of a panel, at all, `(ORDER, FEWER)`."""
+    return np.cos(np.arange(FEWER) * np.arccos(_points())[:, None]) @ _transform(FEWER)
+
+
 @cache
 def _from_pieces():
     """Lagrange polynomials of a panel as sums of few Chebyshev polynomials on each piece.
 
-    `(PIECES, PIECE_ORDER, ORDER)`: by the discrete cosine transform, which is exact, and cut off.
+    `(PIECES, PIECE_ORDER, ORDER)`: exact, and cut off.
     """
-
-    def transform(order):
-        matrix = np.cos(np.arange(order)[:, None] * np.arccos(_points(order))) * 2 / order
-        matrix[0] /= 2
-        return matrix  # from values at the Chebyshev points to coefficients
-
     middles = (2 * np.arange(PIECES) + 1) / PIECES - 1
     places = middles[:, None] + _points() / PIECES
-    values = np.cos(np.arange(ORDER) * np.arccos(places)[..., None]) @ transform(ORDER)
-    return np.einsum("ln,inm->ilm", transform(ORDER)[:PIECE_ORDER], values)
+    values = np.cos(np.arange(ORDER) * np.arccos(places)[..., None]) @ _transform(ORDER)
+    return np.einsum("ln,inm->ilm", _transform(ORDER)[:PIECE_ORDER], values)
 
 
 def _polynomials(place, order):

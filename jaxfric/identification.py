@@ -77,7 +77,7 @@ def solve_rows(term, recording, projection, width, given, grid) -> Identified:
     # Small batches: a refinement loop under vmap makes every row wait for the slowest. Long rows
     # one by one, so that of the ways of `reduced.orthonormal` each goes one, not both.
     count, samples = recording.time.shape
-    together = None if samples >= reduced.TALL else min(16, count)
+    together = None if samples >= reduced.TALL else min(8, count)
     return jax.lax.map(one, recording, batch_size=together)
 
 
@@ -94,7 +94,7 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    beta, converged, border, alpha = search(active, recording, rows, box, grid, alike)
+    beta, converged, border, alpha, _ = search(active, recording, rows, box, grid, alike)
     alpha, jacobian, error = _solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)

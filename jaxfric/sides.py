@@ -50,53 +50,43 @@ class Sides(NamedTuple):
 
         return reduced.each(side, self.moments, self.boxes, units)
 
-    def check(self, units: Float[Array, "2 k d"], samples: compress.Straightened):
-        """The gains on the samples that the places stand for, `(2, k)`."""
+    def fitted(
+        self, unit: Float[Array, "2 d"], samples: compress.Straightened
+    ) -> tuple[Float[Array, " 2"], Float[Array, "2 2"]]:
+        """Height, N, of each direction's bump in the best fit, and the line, N and N·s/m, that the
+        bump of that height makes of its own, `(2,)` and `(2, 2)`.
 
-        def decoded(units, box):
-            return jax.vmap(lambda unit: reduced.decode(unit, box, self.logarithmic))(units)
-
-        betas = jax.vmap(decoded)(units, self.boxes)
-        values = jax.vmap(jax.vmap(self.bump, (0, None)), (0, None))(betas, self.places)
-        shares = jnp.einsum("dim,dkm->dik", self.moments.against[:, :2], values)
-
-        def bumps(speed, side):
-            def one(low, high):
-                beta = jnp.where(side[:, None] == 1, high[None, :], low[None, :])
-                return jax.vmap(self.bump)(beta, speed)
-
-            return jax.vmap(one)(*betas)
-
-        return samples.gains(bumps, shares)
-
-    def affine(
-        self, unit: Float[Array, "2 d"], most: Float[Array, " 2"], samples: compress.Straightened
-    ) -> Float[Array, "2 3"]:
-        """Constant, N, slope, N·s/m, and height of the bump, N, of each direction's best fit.
-
-        **Arguments:** `unit`, a point of each unit cube; `most`, the bump's values at the slowest
-        speed, of which `bump` here is the ratio less one; `samples` that the places stand for.
+        **Arguments:** `unit`, a point of each unit cube; `samples` that the places stand for.
         """
 
         def side(item):
-            unit, box, most, line, along, loads, weights = item
+            unit, box, line, along, loads, weights = item
             contrast = rest = self.at(unit, box)
             shares = jnp.zeros(2, rest.dtype)
             for _ in range(2):  # once more for rounding
                 more = along @ rest
                 rest, shares = rest - more @ line, shares + more
             size, whole = weights @ rest**2, weights @ (1 + contrast) ** 2
-            limits = jnp.finfo(rest.dtype)
-            # A bump that is a straight line there, or vanishes in all samples, has no height.
-            visible = (size > (100 * limits.eps) ** 2 * whole) & (most > limits.tiny**0.5)
-            force = jnp.where(visible, loads @ rest / jnp.where(visible, size, 1.0), 0.0)
-            return shares, force, force / jnp.where(visible, most, 1.0)
+            # A bump that is a straight line there has no height.
+            visible = size > (100 * jnp.finfo(rest.dtype).eps) ** 2 * whole
+            return jnp.where(visible, loads @ rest / jnp.where(visible, size, 1.0), 0.0), shares
 
         lines, against = samples.lines(self.places), self.moments.against
         rows = lines, against[:, :2], against[:, 2], self.moments.weights
-        shares, force, height = jax.lax.map(side, (unit, self.boxes, most, *rows))
-        straight = samples.taken - force[:, None] * samples.lines.straight(shares)
-        return jnp.stack([straight[:, 0] - force, straight[:, 1], height], axis=1)
+        height, shares = jax.vmap(side)((unit, self.boxes, *rows))
+        return height, height[:, None] * samples.lines.straight(shares)
+
+    def gained(self, unit: Float[Array, "2 d"], samples: compress.Straightened):
+        """What the best fit on the places takes off the cost of the samples, N²·s."""
+        low, high = (
+            reduced.decode(*pair, self.logarithmic) for pair in zip(unit, self.boxes, strict=True)
+        )
+
+        def bump(speed, side):
+            beta = jnp.where(side[:, None] == 1, high[None, :], low[None, :])
+            return jax.vmap(self.bump)(beta, speed)
+
+        return samples.gained(bump, *self.fitted(unit, samples))
 
     def refined(self, start: Float[Array, "2 d"], cell: Float[Array, "2 d"]):
         """The minimiser of each direction near its start, `(2, d)`, and which converged."""
