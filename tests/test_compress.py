@@ -101,6 +101,8 @@ def test_nodes_stand_for_samples(kind, count, low, narrowest):
     slowest = jnp.min(speed)
     panels = compress.edges(slowest, jnp.max(speed), jnp.asarray(narrowest))
     (few, _), places = COMPRESSED(*along(*data), panels), compress.nodes(panels)
+    fewer, least = compress.fewer(few, panels)
+    assert len(fewer) < 0.5 * len(places)
 
     def costs(at, moments, beta):
         bump = kind().with_beta(beta)
@@ -113,6 +115,10 @@ def test_nodes_stand_for_samples(kind, count, low, narrowest):
         np.testing.assert_allclose(
             costs(places, few, beta), costs(speed, moments, beta), rtol=1e-11
         )
+        if kind is not Generalised or beta[0] > 2 * narrowest:
+            np.testing.assert_allclose(
+                costs(fewer, least, beta), costs(speed, moments, beta), rtol=1e-5
+            )
 
 
 def test_samples_without_weight_do_not_matter():

@@ -292,6 +292,33 @@ def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypa
     assert not confirmed(terms.FrictionalLag(0.02, terms.Gaussian(0.05)), 0.6)
 
 
+def tones_judged(seed, rows, tone):
+    """R² of the best of many tones in eight blocks of noise and a tone, and the hurdle."""
+    draw = np.random.default_rng(seed)
+    at, block = np.sort(draw.uniform(0, 1, rows)), np.arange(rows) * 8 // rows
+    noise = 0.1 * draw.normal(size=rows)
+    residual = noise + tone * np.sin(2 * np.pi * 38.6 * at + draw.uniform(0, 6))
+    basis = np.linalg.qr(np.stack([np.ones(rows), at], axis=1))[0]
+    turned = 2 * np.pi * np.linspace(1.5, 70, 300)[:, None] * at
+    waves = np.stack([np.sin(turned), np.cos(turned)], axis=1).astype(np.float32)
+    fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
+    scan = chance.Judge(fit, block)(waves)
+    return scan.gain[scan.best], chance.thresholds(scan.drawn[None], chance.LEVEL)[0]
+
+
+def test_a_tone_does_not_raise_its_own_hurdle():
+    """Flipped by blocks, most of it would be a tone nearby."""
+    for seed in range(6):
+        (gain, hurdle), (_, without) = (tones_judged(seed, 147, tone) for tone in (1.0, 0.0))
+        assert gain > 0.95 and hurdle < 2 * without
+
+
+def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
+    found = np.array([tones_judged(seed, 20, 0.0) for seed in range(200)])
+    assert np.mean(found[:, 0] > chance.MOSTLY) > 0.3
+    assert np.mean(found[:, 0] > found[:, 1]) <= 0.03
+
+
 def test_blocks_that_disagree_are_chance():
     block = np.repeat(np.arange(20), 5)
     one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)

@@ -106,6 +106,7 @@ def test_nodes_find_what_the_samples_find(name):
     assert np.all((beta >= low * (1 - 1e-12)) & (beta <= high * (1 + 1e-12)))
     reached, direct = cost(beta, *data), cost(np.asarray(wanted.beta), *data)
     np.testing.assert_allclose(reached, direct, rtol=1e-10)
+    np.testing.assert_allclose(found.minimum, np.sum(reached), rtol=1e-10)
     if name != "noise alone":  # there the cost is flat, and its minimum known to its root
         np.testing.assert_allclose(beta, wanted.beta, rtol=1e-8)
     ours, exact = (curve(a, beta, data) for a in (found.alpha, least_squares(beta, data)))
@@ -153,4 +154,28 @@ def test_nodes_that_lie_are_found_out(monkeypatch):
         found = searches(True)(*map(jnp.asarray, data), box)
     finally:
         searches.cache_clear()
-    assert not bool(found.converged)
+    assert not bool(found.converged) and np.isinf(found.minimum)
+
+
+def test_fewer_nodes_that_lie_do_not_decide(monkeypatch):
+    """They see a bump of three times the width, and propose another point of each stretch."""
+
+    def lying(rows, panels):
+        places, few = honest(rows, panels)
+        return 3 * places, few
+
+    honest = compress.fewer
+    data, low, high = CASES["as usual"]
+    box = jnp.asarray([[low, low], [high, high]])
+    wanted = searches(True)(*map(jnp.asarray, data), box)
+    monkeypatch.setattr(compress, "fewer", lying)
+    searches.cache_clear()
+    try:
+        found = searches(True)(*map(jnp.asarray, data), box)
+        monkeypatch.setattr(searching, "STRETCH", 128)
+        searches.cache_clear()
+        astray = searches(True)(*map(jnp.asarray, data), box)
+    finally:
+        searches.cache_clear()
+    np.testing.assert_allclose(found.beta, wanted.beta, rtol=1e-8)
+    assert np.any(np.abs(np.log(np.asarray(astray.beta) / np.asarray(wanted.beta))) > 0.1)
