@@ -20,7 +20,7 @@ from .reduced import PLACES, Moments
 
 # A polynomial through 20 points carries exp(−v²) over an octave to rounding.
 ORDER = 20
-# Through 10 it carries it to 1e-7 or so, by which the places of a grid are told as well.
+# Through 8 it carries it to 1e-6 or so: enough to propose places of a grid.
 FEWER = 8
 # 13 octaves from the finest panel to the fastest speed: a ratio of 8000.
 PANELS = 13
@@ -28,7 +28,7 @@ PANELS = 13
 # over a 64th of it (each is worth a factor of some 2 · 64), and a sample adds to fewer sums.
 PIECES = 64
 PIECE_ORDER = 6
-# Samples whose polynomials are written down together: they fit into the cache, whatever else does.
+# Samples whose polynomials are written down together, 0.8 MB: they stay in the cache.
 TOGETHER = 8192
 # The passes over the samples cost about as much as 10 bumps, and the refinement evaluates 30 more;
 # on short recordings smaller grids are not worth it.
@@ -104,11 +104,6 @@ class Lines(eqx.Module):
         rise = speed[None, :] - self.centre[:, None]
         return self.scale[:, :, None] * jnp.stack([jnp.ones_like(rise), rise], axis=1)
 
-    def of(self, speed: Float[Array, " n"], side: Int[Array, " n"]) -> list[Float[Array, " n"]]:
-        """Their values, each in its sample's direction."""
-        first, second = _of(side, self.scale)
-        return [first, second * (speed - _of(side, self.centre))]
-
     def straight(self, shares: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
         """Constant and slope of a combination of them in each direction."""
         first, second = (shares * self.scale).T
@@ -157,13 +152,10 @@ class Straightened(eqx.Module):
         At the best height and line that is [`Moments.gains`][jaxfric.reduced.Moments.gains],
         summed over the directions. **Arguments:** `bump`, of speeds and directions.
         """
-        left = self.force - self._at(self.rest)
-        law = _of(self.side, height) * bump(self.speed, self.side) - self._at(line)
+        left = self.force - _line(self.rest, self.speed, self.side)
+        law = _of(self.side, height) * bump(self.speed, self.side)
+        law = law - _line(line, self.speed, self.side)
         return (self.weight * law) @ (2 * left - law)
-
-    def _at(self, line):
-        first, second = _of(self.side, line)
-        return first + second * self.speed
 
 
 def compressed(
@@ -185,12 +177,13 @@ def compressed(
     some = slice(None, None, max(1, speed.shape[0] // PLACES))
     rough = orthonormal_lines(speed[some], weights[:, some])
     share = _shares(rough(speed[some]), weights[:, some] * force[None, some])
-    force = force - _line(rough, share, speed, side)
+    taken = rough.straight(share)
+    force = force - _line(taken, speed, side)
     sums = compress(speed, side, jnp.stack([weight, weight * force]), panels)
     places, few, loads = nodes(panels), sums[:, 0], sums[:, 1]
     lines = orthonormal_lines(places, few)
     values = lines(places)
-    taken, share = rough.straight(share), _shares(values, loads)
+    share = _shares(values, loads)
     rest, whole = lines.straight(share), weights @ force**2 - jnp.sum(share**2, axis=1)
     along = values * few[:, None, :]
     loads = loads - jnp.sum(share[:, :, None] * along, axis=1)
@@ -224,11 +217,10 @@ def _shares(lines, loads):
     return jnp.sum(lines * loads[:, None, :], axis=2)
 
 
-def _line(lines: Lines, shares, speed, side):
-    """The value of a combination of lines at each sample, by its direction."""
-    first, second = lines.of(speed, side)
-    share = _of(side, shares)
-    return share[0] * first + share[1] * second
+def _line(line, speed, side):
+    """Constant and slope of each direction as a line at each sample, by its direction."""
+    first, second = _of(side, line)
+    return first + second * speed
 
 
 def _of(side, pair):
