@@ -421,6 +421,19 @@ def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
     assert "0.0369" not in text and "cannot tell" in text
 
 
+def test_a_bump_that_may_be_nil_in_one_direction_is_told_by_its_most():
+    values = {
+        "stribeck_force+": Estimate(np.float64(3.0), np.float64(2.5), "A"),
+        "stribeck_force-": Estimate(np.float64(6.2), np.float64(0.5), "A"),
+    }
+    text = sentence("stribeck", values, 0.4, ())
+    assert "a Stribeck bump of at most 8 A forward and 6.2 A ± 1.0 A backward" in text
+    hidden = values | {"stribeck_force+": Estimate(np.float64(3.0), np.float64(np.inf), "A")}
+    assert "an amount that this recording cannot tell forward" in sentence(
+        "stribeck", hidden, 0.4, ()
+    )
+
+
 @pytest.mark.parametrize("end", ["", "lower_"])
 def test_an_end_stop_is_told_with_its_place_and_stiffness(end):
     place = Estimate(np.float64(0.2312), np.float64(0.0021), "m")

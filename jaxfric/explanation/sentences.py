@@ -72,7 +72,7 @@ _TEXTS = {
 def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals) -> str:
     """One finding as a sentence, with its share and what it could be instead."""
     # The stop at the lower end is told as the one at the upper end.
-    words = {n.removeprefix("lower_"): quantity(estimate) for n, estimate in parameters.items()}
+    words = {n.removeprefix("lower_"): _words(n, estimate) for n, estimate in parameters.items()}
     text = _TEXTS.get(effect, effect.replace("_", " ")).format_map(_Gaps(words))
     text += f"; {share:.0%} of the unexplained force"
     if rivals:
@@ -80,6 +80,15 @@ def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals)
             name.replace("_", " ") for name in rivals
         )
     return text + "."
+
+
+def _words(name: str, estimate: Estimate) -> str:
+    """A value in words; of a bump that may be nil in this direction the most that it may be."""
+    most = float(estimate.value) + 2 * float(estimate.standard_error)
+    nil = abs(float(estimate.value)) <= 2 * float(estimate.standard_error) < math.inf
+    if name.startswith("stribeck_force") and nil:
+        return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
+    return quantity(estimate)
 
 
 def mismatch_sentence(moved, share: float) -> str:
