@@ -11,6 +11,9 @@ GAP = 5.0
 MIN_SAMPLES = 16
 # Three samples are the fewest that have a central difference, that is, a velocity.
 MIN_SEGMENT = 3
+# Stamps are averaged over so many samples each way for the clock that they scatter about: it
+# follows any drift, and what is left of the scatter is an eighth.
+NEAR_STAMPS = 32
 # A turn counted in fewer quanta than this is a switch, not an encoder: its jumps are no seam.
 COARSEST_ENCODER = 16
 # Turns that encoders and controllers count modulo: rad, deg and the binary resolutions.
@@ -52,6 +55,7 @@ def clean(
     segment, rows = _runs(segment[inside]), rows[inside]
     mask = _mask(signals, segment, rows, notes, source)
     _unwrap(signals, mask, segment, rows, notes)
+    _steady(signals, mask, segment, notes)
     return Clean(signals, mask, segment, notes)
 
 
@@ -209,6 +213,51 @@ def _unwrap(signals, mask, segment, rows, notes) -> None:
         reference = np.unwrap(reference, period=turn)
         offset = np.median(signals["position"] - reference)
         signals["reference"] = reference + turn * np.round(offset / turn)
+
+
+def _steady(signals, mask, segment, notes) -> None:
+    """Put samples on the clock that their stamps scatter about, if the motion is smoother on it.
+
+    A sample that was taken late is at v·δ beyond where it would have been, one that was only
+    stamped late is not: the share of v·δ that the position holds is one or zero.
+    """
+    time = signals["time"]
+    name = "position" if "position" in signals else "velocity"
+    late = np.zeros(len(time))
+    for part in np.split(np.arange(len(time)), _borders(segment)):
+        late[part] = _scatter(time[part])
+    signal, usual = signals[name], _usual_step(time, segment)
+    linked = np.abs(np.diff(time) / usual[1:] - 1) < 0.5
+    linked &= mask[1:] & mask[:-1] & (np.diff(segment) == 0)
+    # Third differences leave nothing of the motion itself.
+    whole = linked[:-2] & linked[1:-1] & linked[2:]
+    beyond = np.gradient(signal) * late / usual
+    ours, theirs = (np.diff(x, 3)[whole] for x in (signal, beyond))
+    power = theirs @ theirs
+    if not power > 0:
+        return
+    share = float(theirs @ ours / power)
+    # Neighbouring differences share samples: twice the error of independent ones.
+    error = 2 * float(np.sqrt(np.mean((ours - share * theirs) ** 2) / power))
+    if share + 3 * error < 0.5:
+        signals["time"] = time - late
+        notes.append(
+            f"The time stamps scatter by {np.std(late / usual):.1%} of a step about a steady "
+            f"clock, on which the {name} is smoother; that clock is used."
+        )
+
+
+def _scatter(time: np.ndarray) -> np.ndarray:
+    """By how much each stamp of one segment is late, s, beside a clock that only drifts."""
+    ticks = np.concatenate([[0], np.cumsum(np.rint(np.diff(time) / np.median(np.diff(time))))])
+    if ticks[-1] < len(time) - 1:  # no clock: several stamps within a step
+        return np.zeros(len(time))
+    slope, start = np.polyfit(ticks, time, 1)
+    late = time - (start + slope * ticks)
+    window = np.ones(min(2 * NEAR_STAMPS + 1, len(time)))
+    mean = np.convolve(late, window, "same") / np.convolve(np.ones(len(late)), window, "same")
+    late = late - mean
+    return late if np.max(np.abs(late)) < 0.5 * slope else np.zeros(len(time))
 
 
 def _coarse(step: np.ndarray, jump: np.ndarray) -> bool:
