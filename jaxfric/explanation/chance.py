@@ -76,7 +76,10 @@ class Judge:
         own = self.fresh(raw[scan.best : scan.best + 1])[0][0]
         left = self.residual - (own @ self.residual) @ own
         left /= np.linalg.norm(left)
-        return scan._replace(drawn=self._scan(raw, self.members * left[:, None], positive).drawn)
+        rest = self._scan(raw, self.members * left[:, None], positive).drawn
+        # What a place beside the right one leaves is not noise either: whichever asks for less.
+        lower = np.quantile(rest, 1 - LEVEL) < np.quantile(scan.drawn, 1 - LEVEL)
+        return scan._replace(drawn=rest) if lower else scan
 
     def _scan(self, raw, votes, positive) -> Scan:
         size = max(1, CHUNK // raw.shape[1])
