@@ -230,6 +230,18 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
 _choose = programs.kept(choose_half_width)
 
 
+def smoothing(recording: Recording) -> float:
+    """By how much the derivative that [`prepare`][] takes smooths the velocity, in samples².
+
+    The velocity less that times its second difference is what was smoothed, to first order: a
+    sixth of the third moment of the derivative's weights. None of a velocity that was recorded.
+    """
+    if recording.velocity is not None:
+        return 0.0
+    width = int(_choose(recording))
+    return float(_derivative_weights(width, width) @ np.arange(-width, width + 1.0) ** 3) / 6
+
+
 @programs.kept
 def _slope(recording, signal, half_width, reach):
     # Half a sample more, so that the last sample to each side still counts.

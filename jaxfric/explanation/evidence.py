@@ -146,13 +146,13 @@ def gather(
     **Raises:** `ValueError` if the axis hardly slips.
     """
     count = recording.num_samples
-    prepared = lengthened(recording)
+    prepared, smoothed = lengthened(recording), signals.smoothing(_padded_out(recording))
     width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
     limits = Scales(*(float(x) for x in _scales(prepared)))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
     reach = step * NODES * limits.interval
-    parts = _node_signals(prepared, limits, step, delay)
+    parts = _node_signals(prepared, limits, step, delay, smoothed)
     index, whole, average, slope = _windows(parts, reach)
     speed = parts["velocity"][index]
     moving = np.abs(speed) > limits.slowest
@@ -190,9 +190,13 @@ def gather(
 
 def lengthened(recording: Recording) -> Recording:
     """The recording with its velocity, of one of few lengths, so that few programs are compiled."""
+    return signals.prepare(_padded_out(recording))
+
+
+def _padded_out(recording: Recording) -> Recording:
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", num_segments=1)
-    return signals.prepare(pad(nameless, _length(recording.num_samples)))
+    return pad(nameless, _length(recording.num_samples))
 
 
 _scales = programs.kept(signals.scales)
@@ -212,8 +216,13 @@ def _length(count: int) -> int:
     return octave if count > octave * 3 // 4 else octave * 3 // 4
 
 
-def _node_signals(recording: Recording, limits: Scales, step: int, delay: float) -> dict:
-    """Local means of every signal, `step` samples apart, with the run that each node lies in."""
+def _node_signals(
+    recording: Recording, limits: Scales, step: int, delay: float, smoothed: float
+) -> dict:
+    """Local means of every signal, `step` samples apart, with the run that each node lies in.
+
+    `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
+    """
     time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
     linked = _continuous(time, mask, np.asarray(recording.segment), limits.interval)
     run = np.pad(np.cumsum(~linked), (1, 0))
@@ -244,13 +253,15 @@ def _node_signals(recording: Recording, limits: Scales, step: int, delay: float)
     label = np.where(total > 0, run[centres], -1 - np.arange(len(centres)))
     # Terms are functions of the motion at an instant, not of its mean: the curvature that the
     # triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
-    # and the columns' weights take it off again, so that force and columns are averaged alike.
+    # and the columns' weights take it off again, so that force and columns are averaged alike. So
+    # is what the derivative took off the velocity, which would look like a load on a spring.
     inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
     for name in set(means) - {"force", "time", "elapsed"}:
         values = means[name]
         bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
         means[name] = values.copy()
-        means[name][inner] -= bend / 12
+        lost = 1 / 12 + (smoothed / step**2 if name == "velocity" else 0.0)
+        means[name][inner] -= lost * bend
     return means | {"run": label}
 
 
