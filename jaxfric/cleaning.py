@@ -234,12 +234,12 @@ def _steady(signals, mask, segment, notes) -> None:
     beyond = np.gradient(signal) * late / usual
     ours, theirs = (np.diff(x, 3)[whole] for x in (signal, beyond))
     power = theirs @ theirs
-    if not power > 0:
+    if not power > 0 or np.count_nonzero(whole) < 2 * NEAR_STAMPS:
         return
     share = float(theirs @ ours / power)
     # Neighbouring differences share samples: twice the error of independent ones.
     error = 2 * float(np.sqrt(np.mean((ours - share * theirs) ** 2) / power))
-    if share + 3 * error < 0.5:
+    if abs(share) + 3 * error < 0.5:
         signals["time"] = time - late
         notes.append(
             f"The time stamps scatter by {np.std(late / usual):.1%} of a step about a steady "

@@ -322,6 +322,43 @@ def test_stamps_repeated_backward_and_stray_are_left_out(tmp_path):
     assert "row 152" in notes[0] and "row 122" in notes[1] and "row 52" in notes[2]
 
 
+def trembling(quantum, rate=1000.0, n=4000, share=0.03, drift=2e-3):
+    """A steady motion, and stamps that scatter about a clock that drifts by two steps."""
+    draw = np.random.default_rng(4)
+    ticks = np.arange(n) / rate
+    stamps = ticks + share / rate * draw.normal(size=n) + drift * np.sin(2 * ticks)
+
+    def columns(at):
+        position = 0.05 * np.sin(7 * at) + 0.02 * np.sin(19 * at)
+        position = quantum * np.round(position / quantum)
+        return {"t": stamps, "q": position, "tau": np.cos(7 * at)}
+
+    return ticks, columns
+
+
+@pytest.mark.parametrize("quantum", [1e-7, 1e-6])
+def test_stamps_that_scatter_about_a_steady_clock_are_put_on_it(tmp_path, quantum):
+    ticks, columns = trembling(quantum)
+    even = columns(ticks + 2e-3 * np.sin(2 * ticks))
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", even))
+    assert len(notes) == 1 and "scatter by 3.0% of a step" in notes[0]
+    off = np.asarray(recording.time) - ticks - 2e-3 * np.sin(2 * ticks)
+    assert np.std(off[40:-40]) < 0.25 * 0.03e-3  # the drift is the clock's own
+    moving = {"t": even["t"], "qd": np.gradient(even["q"], 1e-3), "tau": even["tau"]}
+    _, notes = io.read_with_notes(save(tmp_path / "log.csv", moving))
+    assert not notes or "velocity is smoother" in notes[0]
+
+
+@pytest.mark.parametrize("quantum", [1e-7, 1e-6, 1e-3])
+def test_stamps_that_are_right_or_make_no_difference_are_left_alone(tmp_path, quantum):
+    """Samples taken where the stamps say, and an encoder too coarse to tell."""
+    _, columns = trembling(quantum)
+    late = columns(columns(0.0)["t"])
+    recording, notes = io.read_with_notes(save(tmp_path / "log.csv", late))
+    assert not notes
+    np.testing.assert_array_equal(np.asarray(recording.time), late["t"])
+
+
 def test_invalid_samples_are_masked_and_finite(tmp_path):
     columns = log() | {"temperature": np.where(np.arange(200) % 10 == 0, 20.0, np.nan)}
     columns["force"][[3, 4]] = [np.nan, np.inf]

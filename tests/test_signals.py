@@ -138,6 +138,22 @@ def test_the_chosen_width_is_nearly_the_best_of_the_ladder(rate, kind, unit):
     assert errors[chosen] <= 1.3 * min(errors.values()), (chosen, errors)
 
 
+def test_what_the_derivative_takes_off_is_known():
+    """A noisy encoder asks for a wide derivative, which flattens the wave by as much as is said."""
+    clock = np.arange(8000) * 1e-3
+    noise = 2e-5 * np.random.default_rng(3).normal(size=clock.size)
+    record = log(clock, 0.02 * np.sin(40 * clock) + noise)
+    rough, true = np.asarray(signals.prepare(record).velocity), 0.8 * np.cos(40 * clock)
+    back = rough - signals.smoothing(record) * np.gradient(np.gradient(rough))
+
+    def gain(velocity):
+        return velocity[100:-100] @ true[100:-100] / (true[100:-100] @ true[100:-100])
+
+    assert gain(rough) < 0.997
+    assert abs(gain(back) - 1) < 0.1 * (1 - gain(rough))
+    assert signals.smoothing(signals.prepare(record)) == 0.0
+
+
 def test_prepare_keeps_a_recorded_velocity_and_derives_a_missing_one():
     time = np.arange(1000) / 1000
     record = log(time, np.sin(5 * time))
