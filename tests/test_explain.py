@@ -319,6 +319,33 @@ def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
     assert np.mean(found[:, 0] > found[:, 1]) <= 0.03
 
 
+def test_a_tone_returns_in_another_recording_at_any_phase(healthy):
+    """Their clocks begin at different times; at half of its amplitude it has not returned."""
+    term, alpha, beta = CASES["periodic_disturbance"]
+    run = planted(healthy[0], term, alpha, beta)
+    held = [planted(healthy[1], term, other, beta) for other in ((-1.0, -2.0), (0.5, 1.0))]
+    asked = [question.ask(run, each, models.gaussian()) for each in held]
+    found = naming.search(asked[0].evidence, asked[0].base, asked[0].field)
+    assert found.names == {"periodic_disturbance"}
+    before, after = (verification.error(now, asked[0].held) for now in (found.base, found.last))
+    assert after < 0.3 * before
+    before, after = (verification.error(now, asked[1].held) for now in (found.base, found.last))
+    assert after == pytest.approx(before, rel=0.1)
+
+
+def test_a_filtered_velocity_without_a_position_is_said_to_look_like_a_delay(healthy):
+    """Four milliseconds of a first-order filter on the velocity, as drives log it."""
+    position = np.asarray(healthy[0].position)
+    velocity, late = np.gradient(position, TIME), np.zeros_like(position)
+    for i in range(1, len(late)):
+        late[i] = late[i - 1] + 0.25 * (velocity[i] - late[i - 1])
+    run = dataclasses.replace(healthy[0], position=None, velocity=jnp.asarray(late))
+    found = explain(run, "gaussian")
+    assert {each.effect for each in found.findings} & {"transport_delay", "actuator_lag"}
+    text = next(each.sentence for each in found.findings if each.effect in telling.FILTERED)
+    assert text.endswith("recording the position tells.")
+
+
 def test_blocks_that_disagree_are_chance():
     block = np.repeat(np.arange(20), 5)
     one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)

@@ -169,6 +169,10 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
     return "unexplained" if before or rough else "consistent"
 
 
+# What a filter on the recorded velocity cannot be told from.
+FILTERED = frozenset({"transport_delay", "actuator_lag"})
+
+
 def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
     start = len(found.last.terms) - len(found.taken)
     values = estimated(found, asked, rest)[start:]
@@ -184,6 +188,11 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
             text += (
                 " On the held-out recording it has the same period and amplitude at another "
                 "phase: the position's zero has moved, as after another homing."
+            )
+        if effect.name in FILTERED and asked.evidence.motion.position is None:
+            text += (
+                " No position is recorded: a filter on the recorded velocity looks the same, and "
+                "recording the position tells."
             )
         findings.append(
             Finding(

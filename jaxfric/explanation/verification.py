@@ -27,7 +27,7 @@ def residual(
 
     `skipped`: numbers of terms that are left out; `rephased`: numbers of terms whose waves keep
     their amplitude but find their phase anew: the zero of an incremental encoder is another after
-    each homing.
+    each homing, and that of the clock in each recording.
     """
     seen = with_predictions(evidence, now)
     left, waves = evidence.target.copy(), []
@@ -66,12 +66,15 @@ def lasting(now: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
 def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
     """norm(force − predicted)/norm(force) over the rows, nothing refitted.
 
-    Found terms that time alone drives count where they return, and not where they do not.
+    Found terms that time alone drives count where they return, and not where they do not; tones may
+    return at another phase.
     """
     moments = [i for i, t in enumerate(now.terms) if i and isinstance(t, _MOMENTARY)]
     lefts = [residual(now, evidence, rephased)]
     if moments:
         lefts.append(residual(now, evidence, rephased, frozenset(moments)))
+    if tones := _tones(now):
+        lefts.append(residual(now, evidence, rephased | tones, frozenset(moments) - tones))
     power = min(float(left @ left) for left in lefts)
     return float(np.sqrt(power / max(evidence.target @ evidence.target, 1e-300)))
 
@@ -108,7 +111,8 @@ def residuals(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of two fits, each on its view of another recording, with nothing refitted.
 
-    Terms of a moment are left out unless they return there, but for what tells the two apart.
+    Terms of a moment are left out unless they return there, tones at any phase, but for what tells
+    the two apart.
     """
     others = frozenset(
         next(i for i, term in enumerate(less.terms) if term is more.terms[n])
@@ -123,14 +127,27 @@ def residuals(
         for now in (less, more)
     ]
 
-    def pair(skipped) -> tuple[np.ndarray, np.ndarray]:
+    def pair(skipped, anew) -> tuple[np.ndarray, np.ndarray]:
         return (
-            residual(less, views[0], others, skipped[0]),
-            residual(more, views[1], rephased, skipped[1]),
+            residual(less, views[0], others | anew[0], skipped[0]),
+            residual(more, views[1], rephased | anew[1], skipped[1]),
         )
 
-    ways = [idle, [frozenset()] * 2] if idle[1] else [idle]
-    return min(map(pair, ways), key=lambda both: both[1] @ both[1])
+    none = [frozenset[int]()] * 2
+    tones = [_tones(now) & same for now, same in zip((less, more), idle, strict=True)]
+    ways = [(idle, none)]
+    if idle[1]:
+        ways.append((none, none))
+    if tones[1]:
+        others_idle = [same - own for same, own in zip(idle, tones, strict=True)]
+        ways.append((others_idle, tones))
+    return min((pair(*way) for way in ways), key=lambda both: both[1] @ both[1])
+
+
+def _tones(now: Fit) -> frozenset[int]:
+    """Numbers of the found terms that are tones in time."""
+    known = enumerate(now.terms)
+    return frozenset(i for i, t in known if i and isinstance(t, laws.PeriodicDisturbance))
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:
