@@ -230,16 +230,14 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
 _choose = programs.kept(choose_half_width)
 
 
-def smoothing(recording: Recording) -> float:
-    """By how much the derivative that [`prepare`][] takes smooths the velocity, in samples².
+def smoothing(half_width: int) -> float:
+    """By how much the [`derivative`][] of that half-width smooths the velocity, in samples².
 
     The velocity less that times its second difference is what was smoothed, to first order: a
-    sixth of the third moment of the derivative's weights. None of a velocity that was recorded.
+    sixth of the third moment of the derivative's weights.
     """
-    if recording.velocity is not None:
-        return 0.0
-    width = int(_choose(recording))
-    return float(_derivative_weights(width, width) @ np.arange(-width, width + 1.0) ** 3) / 6
+    offsets = np.arange(-half_width, half_width + 1.0)
+    return float(_derivative_weights(half_width, half_width) @ offsets**3) / 6
 
 
 @programs.kept

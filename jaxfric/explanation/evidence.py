@@ -146,7 +146,7 @@ def gather(
     **Raises:** `ValueError` if the axis hardly slips.
     """
     count = recording.num_samples
-    prepared, smoothed = lengthened(recording), signals.smoothing(_padded_out(recording))
+    prepared, smoothed = lengthened(recording)
     width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
     limits = Scales(*(float(x) for x in _scales(prepared)))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
@@ -188,15 +188,17 @@ def gather(
     )
 
 
-def lengthened(recording: Recording) -> Recording:
-    """The recording with its velocity, of one of few lengths, so that few programs are compiled."""
-    return signals.prepare(_padded_out(recording))
-
-
-def _padded_out(recording: Recording) -> Recording:
+def lengthened(recording: Recording) -> tuple[Recording, float]:
+    """The recording with its velocity, of one of few lengths, so that few programs are compiled,
+    and by how much that velocity has been smoothed, in samples².
+    """
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", num_segments=1)
-    return pad(nameless, _length(recording.num_samples))
+    padded = pad(nameless, _length(recording.num_samples))
+    if padded.velocity is not None:
+        return padded, 0.0
+    half_width = int(signals._choose(padded))
+    return signals.prepare(padded, half_width), signals.smoothing(half_width)
 
 
 _scales = programs.kept(signals.scales)

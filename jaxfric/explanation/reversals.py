@@ -60,7 +60,7 @@ def passages(
     force there in parts of the level, from −1 to 1.
     """
     count, width = recording.num_samples, evidence.width
-    prepared = lengthened(recording)
+    prepared, _ = lengthened(recording)
     velocity, segment = np.asarray(prepared.velocity)[:count], np.asarray(recording.segment)
     position, force = np.asarray(recording.position), np.asarray(recording.force)
     forward, backward = _levels(base, evidence)
