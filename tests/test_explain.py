@@ -313,6 +313,19 @@ def test_a_tone_does_not_raise_its_own_hurdle():
         assert gain > 0.95 and hurdle < 2 * without
 
 
+def test_what_a_place_beside_the_right_one_leaves_is_no_noise():
+    """A hardening spring between two of the centres that are tried, nearly without noise."""
+    at = 0.3 * np.sin(np.linspace(0, 40, 1450)) + 0.05 * np.sin(np.linspace(0, 7, 1450))
+    draw, block = np.random.default_rng(0), np.arange(1450) * 24 // 1450
+    residual = (at + 0.05) ** 3 + 1e-5 * draw.normal(size=1450)
+    basis = np.linalg.qr(np.stack([np.ones(1450), np.sign(np.gradient(at))], axis=1))[0]
+    fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
+    cubes = ((at - np.linspace(-0.3, 0.3, 8)[:, None]) ** 3)[:, None].astype(np.float32)
+    scan = chance.Judge(fit, block)(cubes)
+    hurdle = chance.thresholds(scan.drawn[None], chance.LEVEL)[0]
+    assert 0.9 < scan.gain[scan.best] and hurdle < 0.1  # by what it leaves, 0.22
+
+
 def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
     found = np.array([tones_judged(seed, 20, 0.0) for seed in range(200)])
     assert np.mean(found[:, 0] > chance.MOSTLY) > 0.3
