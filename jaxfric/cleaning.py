@@ -221,8 +221,10 @@ def _steady(signals, mask, segment, notes) -> None:
     A sample that was taken late is at v·δ beyond where it would have been, one that was only
     stamped late is not: the share of v·δ that the position holds is one or zero.
     """
+    name = next((role for role in ("position", "velocity") if role in signals), None)
+    if name is None:  # a reference or a force to simulate by
+        return
     time = signals["time"]
-    name = "position" if "position" in signals else "velocity"
     late = np.zeros(len(time))
     for part in np.split(np.arange(len(time)), _borders(segment)):
         late[part] = _scatter(time[part])
