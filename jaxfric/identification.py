@@ -14,7 +14,7 @@ from .models import Model
 from .projections import AbstractProjection, Rows, WeakForm
 from .question import ask
 from .recording import Recording
-from .search import search
+from .search import Found, search
 from .terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from .terms.inertia import Inertia
 from .terms.sample import Scales
@@ -81,32 +81,48 @@ def solve_rows(term, recording, projection, width, given, grid) -> Identified:
     return jax.lax.map(one, recording, batch_size=together)
 
 
-@programs.kept
-def _identify(term, recording, projection, width, given, grid) -> Identified:
-    finite = _finite(recording)
+class _Sought(NamedTuple):
+    """What the nonlinear parameters were sought in, and what was found."""
+
+    limits: Scales
+    rows: Rows
+    found: Found
+
+
+def _seek(term, recording, projection, width, given, grid) -> _Sought:
+    """The nonlinear parameters."""
     recording = _sanitised(recording)
     limits = signals.scales(recording)
     rows = projection.rows(recording, limits)
-    weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
     box = term_bounds(
         active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    beta, converged, border, alpha, _ = search(active, recording, rows, box, grid, alike)
+    return _Sought(limits, rows, search(active, recording, rows, box, grid, alike))
+
+
+def _judge(sought: _Sought, term, recording, projection, width, given, grid) -> Identified:
+    """All parameters and what is known about them, from the nonlinear ones."""
+    limits, rows, (beta, converged, border, alpha, _) = sought
+    finite = _finite(recording)
+    recording = _sanitised(recording)
+    weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
+    active = term if projection.keeps_inertia else _without_inertia(term)
     alpha, jacobian, error = _solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)
     alpha, spread, left, pull = _judged(
-        active.with_beta(beta), alpha, jacobian, error, term, recording, rows, weak
+        active.with_beta(beta), alpha, jacobian, error, term, recording, limits, rows, weak
     )
     matrix = spread.covariance
     nothing = ~finite | (jnp.sum(weight) <= 0)
     alpha = jnp.where(nothing, jnp.nan, alpha)
     matrix = jnp.where(nothing, jnp.inf, matrix)
     model = Model(term.with_beta(beta), alpha, recording.units)
-    slipping = limits.fastest > signals.SLIP_DEVIATIONS * signals.velocity_noise(recording)
+    noise = signals.velocity_noise(recording, limits.interval)
+    slipping = limits.fastest > signals.SLIP_DEVIATIONS * noise
     hidden = jnp.any(jnp.isinf(jnp.diagonal(matrix)))
     return Identified(
         model,
@@ -121,6 +137,9 @@ def _identify(term, recording, projection, width, given, grid) -> Identified:
     )
 
 
+_identify = programs.kept(_seek, _judge)
+
+
 class _Judged(NamedTuple):
     """Affine parameters of the whole term, deviations of all parameters, what is left of the weak
     form's rows, and the bias that open ends would leave.
@@ -132,7 +151,9 @@ class _Judged(NamedTuple):
     open_ends: Float[Array, " q"]
 
 
-def _judged(known, alpha, jacobian, error, term, recording, rows: Rows, weak: Rows) -> _Judged:
+def _judged(
+    known, alpha, jacobian, error, term, recording, limits: Scales, rows: Rows, weak: Rows
+) -> _Judged:
     """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
     weight = rows.positive + rows.negative
     place = uncertainty.places(weight)
@@ -147,8 +168,8 @@ def _judged(known, alpha, jacobian, error, term, recording, rows: Rows, weak: Ro
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
     # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
-    typical = signals.interval(recording)
-    slope = signals.local_quadratic(recording, recording.velocity, 8 * typical, 8)[1]
+    span = 8 * limits.interval
+    slope = signals.local_quadratic(recording, recording.velocity, span, 8)[1]
     spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
     return _Judged(

@@ -9,6 +9,7 @@ import os
 import pickle
 import platform
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from pathlib import Path
@@ -42,20 +43,30 @@ def kept_in(folder: Path | None) -> Iterator[None]:
         _folder = before
 
 
-def kept(function: Callable) -> Callable:
+def kept(*steps: Callable) -> Callable:
     """A function of pytrees compiled as by `equinox.filter_jit`, and kept where [`kept_in`][] says.
+
+    Of several steps each takes what the one before returned, then the arguments; while the
+    program of one compiles, the next is traced, and compiles beside it.
 
     Only calls with concrete arrays on a single CPU device are kept; any other is as without.
     """
-    compiled = eqx.filter_jit(function)
+    compiled = [eqx.filter_jit(step) for step in steps]
 
-    @wraps(function)
+    @wraps(steps[-1])
     def call(*arguments):
         if _folder is None or not _simple(arguments):
-            return compiled(*arguments)
-        return _call(function, arguments, _folder)
+            return _in_turn(compiled, arguments)
+        return _in_turn(_programs(steps, arguments, _folder), arguments)
 
     return call
+
+
+def _in_turn(steps, arguments):
+    before: tuple = ()
+    for step in steps:
+        before = (step(*before, *arguments),)
+    return before[0]
 
 
 @cache
@@ -76,19 +87,60 @@ def _simple(arguments) -> bool:
     return not traced and jax.default_backend() == "cpu" and jax.device_count() == 1
 
 
-def _call(function, arguments, folder: Path):
-    arrays, others = eqx.partition(arguments, eqx.is_array)
-    leaves, tree = jax.tree.flatten(arrays)
-    name = f"{function.__module__}.{function.__qualname__}"
-    key = _key(name, leaves, tree, others)
-    path = folder / f"{name}-{key}.program"
-    found = _load(path, len(leaves))
-    if found is None:
-        found = _compile(function, leaves, tree, others)
-        _save(path, *found)
-    program, template = found
-    values = program(leaves)
-    return jax.tree.map(lambda i: values[i], template)
+def _programs(steps, arguments, folder: Path) -> list[Callable]:
+    """The steps' programs, from the folder or made now."""
+    before: tuple = ()
+    found = []
+    with _unshared(), ThreadPoolExecutor() as pool:
+        for step in steps:
+            program = _Program(step, (*before, *arguments), folder, pool)
+            found.append(program)
+            before = (program.template,)
+    for program in found:
+        program.save()
+    return found
+
+
+class _Program:
+    """A function of pytrees of given shapes as a program, out of a folder or soon compiled.
+
+    `template`: what it returns, with shapes in place of arrays.
+    """
+
+    def __init__(self, function, arguments, folder: Path, pool: Executor):
+        leaves, tree, others = _flattened(arguments)
+        name = f"{function.__module__}.{function.__qualname__}"
+        self.path = folder / f"{name}-{_key(name, leaves, tree, others)}.program"
+        found = _load(self.path, len(leaves))
+        self.known = found is not None
+        if found is None:
+            lowered, self.template = _lower(function, leaves, tree, others)
+            size = max((leaf.size for leaf in leaves), default=0)
+            options = quick_options() if size <= QUICK_SAMPLES else None
+            self.binary = pool.submit(lowered.compile, options)
+        else:
+            binary, self.template = found
+            self.binary = Future()
+            self.binary.set_result(binary)
+
+    def __call__(self, *arguments):
+        values = self.binary.result()(_flattened(arguments)[0])
+        return jax.tree.unflatten(jax.tree.structure(self.template), values)
+
+    def save(self) -> None:
+        """Put a program that was not there into the folder."""
+        if not self.known:
+            _save(self.path, self.binary.result(), self.template)
+
+
+def _flattened(arguments):
+    """The arrays among the leaves, the structure that holds them, and the other leaves."""
+
+    def is_array(leaf):
+        return eqx.is_array(leaf) or isinstance(leaf, jax.ShapeDtypeStruct)
+
+    arrays, others = eqx.partition(arguments, is_array)
+    return *jax.tree.flatten(arrays), others
 
 
 def _key(name: str, leaves, tree, others) -> str:
@@ -121,8 +173,8 @@ def _host() -> tuple[str, ...]:
     return tuple(facts)
 
 
-def _compile(function, leaves, tree, others):
-    """The program from leaves to leaves, and the output with numbers in place of its arrays."""
+def _lower(function, leaves, tree, others):
+    """The program from leaves to leaves before it is compiled, and its output's template."""
     structure: list[Any] = []
 
     def flat(leaves):
@@ -132,16 +184,19 @@ def _compile(function, leaves, tree, others):
         return result
 
     lowered = jax.jit(flat).lower(leaves)
-    size = max((leaf.size for leaf in leaves), default=0)
-    threshold = jax.config.jax_persistent_cache_min_compile_time_secs
-    # A program out of jax's own cache cannot be written a second time, so it must not get there.
+    shapes = [jax.ShapeDtypeStruct(info.shape, info.dtype) for info in lowered.out_info]
+    return lowered, jax.tree.unflatten(structure[-1], shapes)
+
+
+@contextmanager
+def _unshared() -> Iterator[None]:
+    """Inside, jax's own cache takes no program: one out of it cannot be written a second time."""
+    threshold = jax.config.values["jax_persistent_cache_min_compile_time_secs"]
     jax.config.update("jax_persistent_cache_min_compile_time_secs", float("inf"))
     try:
-        program = lowered.compile(quick_options() if size <= QUICK_SAMPLES else None)
+        yield
     finally:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", threshold)
-    made = structure[-1]
-    return program, jax.tree.unflatten(made, range(made.num_leaves))
 
 
 def _load(path: Path, count: int):

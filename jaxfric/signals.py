@@ -149,14 +149,17 @@ def local_quadratic(
     )
 
 
-def white_noise(recording: Recording, signal: Float[Array, " N"]) -> Float[Array, ""]:
+def white_noise(
+    recording: Recording, signal: Float[Array, " N"], typical: Float[Array, ""]
+) -> Float[Array, ""]:
     """Standard deviation of the white part of a signal, rounding to encoder counts included.
 
     From the mean magnitude of fourth differences (von Neumann's idea: a smooth signal has none),
-    over the samples where the signal moves, since at rest an encoder shows no noise.
+    over the samples where the signal moves, since at rest an encoder shows no noise. `typical` is
+    the sampling [`interval`][], s.
     """
     weights = jnp.asarray([1.0, -4.0, 6.0, -4.0, 1.0], signal.dtype)
-    together = continuous(recording, interval(recording))
+    together = continuous(recording, typical)
     size = signal.shape[0] - 4
     pieces = jnp.stack([signal[i : i + size] for i in range(5)])
     whole = jnp.all(jnp.stack([together[i : i + size] for i in range(4)]), axis=0)
@@ -208,7 +211,8 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
     slopes = jnp.fft.irfft(spectrum, length)[:, reach : reach + size]
 
     wide, pilot = _pilots(widths)
-    breaks = jnp.cumsum(~continuous(recording, interval(recording)))
+    typical = interval(recording)
+    breaks = jnp.cumsum(~continuous(recording, typical))
     breaks = jnp.pad(breaks, (1, 0))
     index, span = jnp.arange(size)[None, :], jnp.asarray(widths[wide])[:, None]
     after, before = jnp.minimum(index + span, size - 1), jnp.maximum(index - span, 0)
@@ -221,7 +225,7 @@ def choose_half_width(recording: Recording, reach: int = HALF_WIDTHS[-1]) -> Flo
     error = jnp.where(whole, slopes[wide] - slopes[pilot], 0.0)
     count = jnp.sum(whole, axis=1)
     mean = jnp.sum(error**2, axis=1) / jnp.maximum(count, 1).astype(dtype)
-    power = white_noise(recording, position) ** 2
+    power = white_noise(recording, position, typical) ** 2
     bias = share**2 * jnp.maximum(mean - power * rough, 0.0)
     risk = jnp.where(count > 0, bias + power * jnp.sum(weights**2, axis=1), jnp.inf)
     return jnp.asarray(widths, dtype)[jnp.argmin(risk)]
@@ -279,17 +283,18 @@ def prepare(
     return dataclasses.replace(recording, velocity=velocity)
 
 
-def velocity_noise(recording: Recording) -> Float[Array, ""]:
-    """Standard deviation of the white part of the velocity, m/s."""
-    return white_noise(recording, recording.velocity)
+def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:
+    """Standard deviation of the white part of the velocity, m/s; `typical`: sampling interval."""
+    return white_noise(recording, recording.velocity, typical)
 
 
 def scales(recording: Recording) -> Scales:
     """Magnitudes of a prepared recording, from which bounds and thresholds are derived."""
     valid = recording.mask
     speed = jnp.where(valid, jnp.abs(recording.velocity), jnp.nan)
-    fastest = quantile(speed, 0.98)
-    slowest = jnp.maximum(SLIP_DEVIATIONS * velocity_noise(recording), SLIP_SHARE * fastest)
+    fastest, typical = quantile(speed, 0.98), interval(recording)
+    noise = velocity_noise(recording, typical)
+    slowest = jnp.maximum(SLIP_DEVIATIONS * noise, SLIP_SHARE * fastest)
     position = recording.velocity if recording.position is None else recording.position
     inside = jnp.where(valid, position, jnp.nan)
     time = jnp.where(valid, recording.time, jnp.nan)
@@ -297,7 +302,7 @@ def scales(recording: Recording) -> Scales:
     force = jnp.sqrt(jnp.sum(jnp.where(valid, recording.force, 0.0) ** 2) / count)
     start, end = jnp.nanmin(time), jnp.nanmax(time)
     low, high = jnp.nanmin(inside), jnp.nanmax(inside)
-    return Scales(slowest, fastest, low, high, force, start, end - start, interval(recording))
+    return Scales(slowest, fastest, low, high, force, start, end - start, typical)
 
 
 def counter_velocity(
@@ -321,10 +326,10 @@ def counter_velocity(
 
 @programs.kept
 def _host_facts(recording):
-    limits = scales(recording)
-    position = recording.position
-    jitter = jnp.zeros(()) if position is None else white_noise(recording, position)
-    return limits, velocity_noise(recording), jitter, continuous(recording, limits.interval)
+    limits, position = scales(recording), recording.position
+    typical = limits.interval
+    jitter = jnp.zeros(()) if position is None else white_noise(recording, position, typical)
+    return limits, velocity_noise(recording, typical), jitter, continuous(recording, typical)
 
 
 def kernel_half_width(recording: Recording) -> int:

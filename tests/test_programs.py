@@ -69,6 +69,44 @@ def test_whatever_decides_a_program_is_in_its_name(tmp_path):
     assert Traces.count == 5
 
 
+def first(scale, pair):
+    Traces.count += 1
+    return Pair(scale * pair.value, pair.name), None
+
+
+def second(before, scale, pair):
+    Traces.count += 1
+    (scaled, nothing) = before
+    assert nothing is None and scaled.name == pair.name
+    return scaled.value - pair.value, pair
+
+
+def test_steps_are_kept_one_by_one(tmp_path):
+    steps = programs.kept(first, second)
+    plain = steps(3, ARGUMENTS[0])
+    Traces.count = 0
+    for again, traced in ((None, 2), (None, 0), ("first", 1), ("second", 1)):
+        for path in files(tmp_path):
+            if again is not None and again in path.name:
+                path.unlink()
+        with programs.kept_in(tmp_path):
+            found = steps(3, ARGUMENTS[0])
+        assert Traces.count == traced and len(files(tmp_path)) == 2
+        assert jax.tree.structure(found) == jax.tree.structure(plain)
+        np.testing.assert_array_equal(found[0], [0.0, 2.0, 4.0])
+        np.testing.assert_array_equal(found[1].value, plain[1].value)
+        Traces.count = 0
+
+
+def test_a_step_that_fails_says_so(tmp_path):
+    def fails(before, scale, pair):
+        raise ValueError("no such model")
+
+    with programs.kept_in(tmp_path), pytest.raises(ValueError, match="no such model"):
+        programs.kept(first, fails)(3, ARGUMENTS[0])
+    assert not files(tmp_path) and not any(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize("damage", [b"", b"not a program", None])
 def test_a_damaged_program_is_made_anew(tmp_path, damage):
     call(tmp_path)
