@@ -13,19 +13,34 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import cache, wraps
 from pathlib import Path
-from typing import Any
+from threading import Lock
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 
-# Programs in the folder, some 2 MB each; of more the one that was not used for longest goes.
-MOST = 48
+# Bytes of programs in the folder, from 0.1 MB for a term's columns to 2 MB for an identification;
+# of more the one that was not used for longest goes.
+MOST = 128 * 2**20
 # XLA's newer way to emit loops, and its optimisation of them, take five times as long to compile
-# an identification as it then runs quicker on 50,000 samples.
-_QUICK: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 0}
+# an identification as it then runs quicker on 50,000 samples. What runs hundreds of times is
+# optimised a little.
+_QUICK: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
+LITTLE = 1
 QUICK_SAMPLES = 2**16
 
-_folder: Path | None = None
+
+class _Store(NamedTuple):
+    """A folder of programs, and what has been taken from it or put there."""
+
+    folder: Path
+    at_hand: dict[Any, list["_Program"]]
+
+
+_store: _Store | None = None
+# jax's threshold before each thread that is in [`_unshared`][].
+_thresholds: list[float] = []
+_lock = Lock()
 
 
 @contextmanager
@@ -35,19 +50,20 @@ def kept_in(folder: Path | None) -> Iterator[None]:
     The folder must be the user's own: a program in it is trusted as an installed one is. `None`
     changes nothing.
     """
-    global _folder
-    before, _folder = _folder, folder
+    global _store
+    before, _store = _store, None if folder is None else _Store(folder, {})
     try:
         yield
     finally:
-        _folder = before
+        _store = before
 
 
-def kept(*steps: Callable) -> Callable:
+def kept(*steps: Callable, optimised: int = 0) -> Callable:
     """A function of pytrees compiled as by `equinox.filter_jit`, and kept where [`kept_in`][] says.
 
     Of several steps each takes what the one before returned, then the arguments; while the
-    program of one compiles, the next is traced, and compiles beside it.
+    program of one compiles, the next is traced, and compiles beside it. `optimised`: how much XLA
+    optimises programs of few samples that are kept.
 
     Only calls with concrete arrays on a single CPU device are kept; any other is as without.
     """
@@ -55,9 +71,9 @@ def kept(*steps: Callable) -> Callable:
 
     @wraps(steps[-1])
     def call(*arguments):
-        if _folder is None or not _simple(arguments):
+        if _store is None or not _simple(arguments):
             return _in_turn(compiled, arguments)
-        return _in_turn(_programs(steps, arguments, _folder), arguments)
+        return _in_turn(_programs(steps, arguments, optimised, _store), arguments)
 
     return call
 
@@ -70,16 +86,17 @@ def _in_turn(steps, arguments):
 
 
 @cache
-def quick_options() -> dict[str, Any]:
+def quick_options(optimised: int = 0) -> dict[str, Any]:
     """Options of XLA that compile quickly what is run a few times; those that this jaxlib knows."""
+    options = _QUICK | {"xla_backend_optimization_level": optimised}
 
     def known(name: str) -> bool:
         with suppress(jax.errors.JaxRuntimeError):
-            jax.jit(lambda: 0).lower().compile({name: _QUICK[name]})
+            jax.jit(lambda: 0).lower().compile({name: options[name]})
             return True
         return False
 
-    return {name: value for name, value in _QUICK.items() if known(name)}
+    return {name: value for name, value in options.items() if known(name)}
 
 
 def _simple(arguments) -> bool:
@@ -87,18 +104,20 @@ def _simple(arguments) -> bool:
     return not traced and jax.default_backend() == "cpu" and jax.device_count() == 1
 
 
-def _programs(steps, arguments, folder: Path) -> list[Callable]:
+def _programs(steps, arguments, optimised: int, store: _Store) -> list["_Program"]:
     """The steps' programs, from the folder or made now."""
-    before: tuple = ()
-    found = []
-    with _unshared(), ThreadPoolExecutor() as pool:
-        for step in steps:
-            program = _Program(step, (*before, *arguments), folder, pool)
-            found.append(program)
-            before = (program.template,)
-    for program in found:
-        program.save()
-    return found
+    key = steps, _form(arguments)
+    if key not in store.at_hand:
+        found: list[_Program] = []
+        with _unshared(), ThreadPoolExecutor() as pool:
+            for step in steps:
+                before = tuple(program.template for program in found[-1:])
+                given = (*before, *arguments)
+                found.append(_Program(step, given, optimised, store.folder, pool))
+        for program in found:
+            program.save()
+        store.at_hand[key] = found
+    return store.at_hand[key]
 
 
 class _Program:
@@ -107,16 +126,15 @@ class _Program:
     `template`: what it returns, with shapes in place of arrays.
     """
 
-    def __init__(self, function, arguments, folder: Path, pool: Executor):
-        leaves, tree, others = _flattened(arguments)
+    def __init__(self, function, arguments, optimised: int, folder: Path, pool: Executor):
         name = f"{function.__module__}.{function.__qualname__}"
-        self.path = folder / f"{name}-{_key(name, leaves, tree, others)}.program"
-        found = _load(self.path, len(leaves))
+        self.path = folder / f"{name}-{_key(name, _form(arguments))}.program"
+        found = _load(self.path, len(_arrays(arguments)))
         self.known = found is not None
         if found is None:
-            lowered, self.template = _lower(function, leaves, tree, others)
-            size = max((leaf.size for leaf in leaves), default=0)
-            options = quick_options() if size <= QUICK_SAMPLES else None
+            lowered, self.template = _lower(function, arguments)
+            size = max((leaf.size for leaf in _arrays(arguments)), default=0)
+            options = quick_options(optimised) if size <= QUICK_SAMPLES else None
             self.binary = pool.submit(lowered.compile, options)
         else:
             binary, self.template = found
@@ -124,7 +142,7 @@ class _Program:
             self.binary.set_result(binary)
 
     def __call__(self, *arguments):
-        values = self.binary.result()(_flattened(arguments)[0])
+        values = self.binary.result()(_arrays(arguments))
         return jax.tree.unflatten(jax.tree.structure(self.template), values)
 
     def save(self) -> None:
@@ -133,21 +151,24 @@ class _Program:
             _save(self.path, self.binary.result(), self.template)
 
 
-def _flattened(arguments):
-    """The arrays among the leaves, the structure that holds them, and the other leaves."""
-
-    def is_array(leaf):
-        return eqx.is_array(leaf) or isinstance(leaf, jax.ShapeDtypeStruct)
-
-    arrays, others = eqx.partition(arguments, is_array)
-    return *jax.tree.flatten(arrays), others
+def _is_array(leaf) -> bool:
+    return eqx.is_array(leaf) or isinstance(leaf, jax.ShapeDtypeStruct)
 
 
-def _key(name: str, leaves, tree, others) -> str:
+def _arrays(arguments) -> list:
+    return [leaf for leaf in jax.tree.leaves(arguments) if _is_array(leaf)]
+
+
+def _form(arguments) -> tuple:
+    """All of the arguments but the arrays' values."""
+    leaves, tree = jax.tree.flatten(arguments)
+    return tree, tuple((x.shape, str(x.dtype)) if _is_array(x) else x for x in leaves)
+
+
+def _key(name: str, form: tuple) -> str:
     """What a program depends on: its source, its static arguments, shapes, jax, and the machine."""
-    shapes = [(leaf.shape, str(leaf.dtype)) for leaf in leaves]
     settings = (jax.config.values["jax_enable_x64"], os.environ.get("XLA_FLAGS", ""))
-    facts = (name, str(tree), repr(jax.tree.flatten(others)), shapes, settings, _source(), _host())
+    facts = (name, *map(repr, form), settings, _source(), _host())
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:32]
 
 
@@ -173,17 +194,21 @@ def _host() -> tuple[str, ...]:
     return tuple(facts)
 
 
-def _lower(function, leaves, tree, others):
-    """The program from leaves to leaves before it is compiled, and its output's template."""
+def _lower(function, arguments):
+    """The program from arrays to arrays before it is compiled, and its output's template."""
+    leaves, tree = jax.tree.flatten(arguments)
+    places = [i for i, leaf in enumerate(leaves) if _is_array(leaf)]
     structure: list[Any] = []
 
-    def flat(leaves):
-        arrays = jax.tree.unflatten(tree, leaves)
-        result, made = jax.tree.flatten(function(*eqx.combine(arrays, others)))
+    def flat(arrays):
+        traced = list(leaves)
+        for i, array in zip(places, arrays, strict=True):
+            traced[i] = array
+        result, made = jax.tree.flatten(function(*jax.tree.unflatten(tree, traced)))
         structure.append(made)
         return result
 
-    lowered = jax.jit(flat).lower(leaves)
+    lowered = jax.jit(flat).lower([leaves[i] for i in places])
     shapes = [jax.ShapeDtypeStruct(info.shape, info.dtype) for info in lowered.out_info]
     return lowered, jax.tree.unflatten(structure[-1], shapes)
 
@@ -191,12 +216,17 @@ def _lower(function, leaves, tree, others):
 @contextmanager
 def _unshared() -> Iterator[None]:
     """Inside, jax's own cache takes no program: one out of it cannot be written a second time."""
-    threshold = jax.config.values["jax_persistent_cache_min_compile_time_secs"]
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", float("inf"))
+    name = "jax_persistent_cache_min_compile_time_secs"
+    with _lock:
+        _thresholds.append(jax.config.values[name])
+        jax.config.update(name, float("inf"))
     try:
         yield
     finally:
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", threshold)
+        with _lock:
+            before = _thresholds.pop()
+            if not _thresholds:
+                jax.config.update(name, before)
 
 
 def _load(path: Path, count: int):
@@ -225,6 +255,9 @@ def _save(path: Path, program, template) -> None:
         whole = path.with_suffix(f".{os.getpid()}")
         whole.write_bytes(pickle.dumps((binary, template)))
         whole.replace(path)
-        files = sorted(path.parent.glob("*.program"), key=lambda f: f.stat().st_mtime)
-        for old in files[:-MOST]:
-            old.unlink()
+        files = sorted(path.parent.glob("*.program"), key=lambda f: -f.stat().st_mtime)
+        room = MOST
+        for file in files:
+            room -= file.stat().st_size
+            if room < 0:
+                file.unlink()

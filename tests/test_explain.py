@@ -4,6 +4,7 @@ import dataclasses
 import json
 import types
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -373,6 +374,30 @@ def tried(seen):
     frequencies = lines.line_frequencies(seen, "time")
     assert len(foreign) + len(own) <= len(frequencies)
     return foreign, own, frequencies[1] - frequencies[0]
+
+
+@pytest.mark.parametrize(
+    "make, beta",
+    [
+        (lambda n: terms.FrictionStep(ramp=n), [7.0]),
+        (lambda n: terms.FrictionStep(terms.Directional(terms.Coulomb()), ramp=0 * n), [7.0]),
+        (lambda n: terms.Spring(rest=n) + terms.LoadDrift(start=n, duration=3 * n, degree=2), []),
+        (lambda n: terms.DisturbancePulses((n, 2 * n), width=n), []),
+        (lambda n: terms.Table("velocity", (-n, n, 2 * n)), []),
+    ],
+)
+def test_numbers_of_the_recording_are_data_of_a_compiled_term(make, beta, healthy, monkeypatch):
+    traced = []
+    columns = evidence._columns
+    counted = lambda *arguments: traced.append(1) or columns(*arguments)  # noqa: E731
+    monkeypatch.setattr(evidence, "_compiled", eqx.filter_jit(counted))
+    motion = evidence.gather(healthy[0]).motion
+    for number in (0.1, 0.25, 1.0):
+        term = make(number)
+        plain, _ = evidence.evaluate(term, jnp.asarray([beta, beta]), motion)
+        expected = term.with_beta(jnp.asarray(beta)).columns(motion).T
+        np.testing.assert_allclose(plain[1], expected, rtol=1e-12, atol=1e-12)
+    assert len(traced) == 1
 
 
 def test_what_the_motion_has_is_no_tone_but_alone(healthy):

@@ -134,7 +134,12 @@ def test_inside_a_trace_it_is_an_ordinary_function(tmp_path):
 
 
 def test_the_oldest_programs_go(tmp_path, monkeypatch):
-    monkeypatch.setattr(programs, "MOST", 2)
+    call(tmp_path)
+    size = files(tmp_path)[0].stat().st_size
+    monkeypatch.setattr(programs, "MOST", int(2.5 * size))
     for power in range(4):
         call(tmp_path, (ARGUMENTS[0], power, ARGUMENTS[2]))
+        Traces.count = 0
     assert len(files(tmp_path)) == 2
+    call(tmp_path, (ARGUMENTS[0], 3, ARGUMENTS[2]))
+    assert Traces.count == 0

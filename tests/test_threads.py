@@ -35,3 +35,18 @@ def test_where_one_fails_the_others_are_not_begun():
         threads.each(work, range(50))
     fail.set()
     assert len(begun) < 10
+
+
+def test_blas_keeps_to_one_thread_until_the_last_leaves():
+    threadpoolctl = pytest.importorskip("threadpoolctl")
+
+    def counts():
+        infos = threadpoolctl.threadpool_info()
+        return [info["num_threads"] for info in infos if info["user_api"] == "blas"]
+
+    before = counts()
+    with threads.single():
+        with pytest.raises(RuntimeError), threads.single():
+            raise RuntimeError
+        assert counts() == [1] * len(before)
+    assert counts() == before

@@ -45,7 +45,7 @@ def fitted(
         from ..selection import select
 
         model = select(recording).name
-    with kept_in(_programs()):
+    with kept_in(programs_folder()):
         prepared = prepare(uniform(recording))
         chosen: AbstractProjection | None = None
         if projection == "closed-windows":
@@ -60,7 +60,7 @@ def fitted(
     return model, jax.tree.map(np.asarray, found)
 
 
-def _programs() -> Path | None:
+def programs_folder() -> Path | None:
     """Beside jax's own cache, if there is one."""
     folder = jax.config.values["jax_compilation_cache_dir"]
     return None if folder is None else Path(folder) / "programs"

@@ -7,9 +7,10 @@ from .. import documents, tabulate
 from ..explanation import Explanation, explain
 from ..io import write_text
 from ..models import Model, load, named
+from ..programs import kept_in
 from ..recording import Recording
 from ..report import page
-from .commands import put, read
+from .commands import programs_folder, put, read
 
 
 def run(arguments: Namespace) -> int:
@@ -18,9 +19,10 @@ def run(arguments: Namespace) -> int:
     holdout = read(arguments.holdout, arguments)[0] if arguments.holdout else None
     baseline = _baseline(arguments)
     try:
-        found = explain(
-            recording, baseline, holdout, fixed=arguments.fixed, simulate=arguments.simulate
-        )
+        with kept_in(programs_folder()):
+            found = explain(
+                recording, baseline, holdout, fixed=arguments.fixed, simulate=arguments.simulate
+            )
     except ValueError as error:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()

@@ -6,7 +6,11 @@ weak form is a weighted sum of thirteen of them: the same linear functional for 
 every column, at a cost that follows the record's bandwidth and not its sample rate.
 """
 
+import copy
 import dataclasses
+import operator
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -89,45 +93,72 @@ class Evidence(NamedTuple):
 
 def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Weighted sums of the nodes around every third one, of which `rows` are kept."""
-    count = len(weights)
-    total = np.zeros((*values.shape[:-1], count))
-    for k in range(weights.shape[1]):
-        total += weights[:, k] * values[..., k : k + STRIDE * count : STRIDE][..., :count]
-    return total[..., rows]
+    around = np.lib.stride_tricks.sliding_window_view(values, weights.shape[1], axis=-1)
+    centred = around[..., ::STRIDE, :][..., : len(weights), :]
+    return np.einsum("...ck,ck->...c", centred, weights)[..., rows]
 
 
 def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
     """Columns, `(B, p, M)`, and momentum, `None` where there is none, at β, `(B, d)`.
 
-    Compiled once for each kind of term and each of the two B; but a term with numbers of the
-    recording built into its structure (the middle of the stroke, say) would be compiled for every
-    recording anew.
+    Compiled once for each kind of term and each of the few B: numbers of the recording that are
+    built into a term's structure (the middle of the stroke, say) go in as data.
     """
-    return (_columns if _has_numbers(term) else _compiled)(term, betas, motion)
+    numbers: list[float] = []
+
+    def take(number: float) -> float:
+        numbers.append(number)
+        return 1.0
+
+    form = _renumbered(term, take)
+    return _compiled(form, betas, jnp.asarray(numbers, betas.dtype), motion)
 
 
-def _columns(term, betas, motion):
+def _columns(form, betas, numbers, motion):
     def one(beta):
-        known = term.with_beta(beta)
-        return known.columns(motion).T, known.momentum(motion).T if term.inertial else None
+        inside = iter(numbers)
+        known = _renumbered(form.with_beta(beta), lambda _: next(inside))
+        return known.columns(motion).T, known.momentum(motion).T if form.inertial else None
 
-    if term.nonlinear:
+    if form.nonlinear:
         return jax.vmap(one)(betas)
     alone = one(betas[0])
     return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (len(betas), *x.shape)), alone)
 
 
-_compiled = eqx.filter_jit(_columns)
+_compiled = programs.kept(_columns, optimised=programs.LITTLE)
 
 
-def _has_numbers(term: Any) -> bool:
-    """Whether any static field, however deep, is a floating-point number or several."""
-    if isinstance(term, tuple):
-        return any(isinstance(part, float) or _has_numbers(part) for part in term)
-    if not isinstance(term, AbstractTerm):
-        return False
-    fields = [(f.metadata.get("static"), getattr(term, f.name)) for f in dataclasses.fields(term)]
-    return any((static and isinstance(v, float)) or _has_numbers(v) for static, v in fields)
+def _renumbered(part: Any, number: Callable[[float], Any]) -> Any:
+    """A term whose static floating-point numbers, however deep, are replaced; but zeros, which are
+    another form of the law, stay.
+    """
+    if isinstance(part, float) and part != 0:
+        return number(part)
+    if isinstance(part, tuple):
+        parts = tuple(_renumbered(each, number) for each in part)
+        return part if all(map(operator.is_, parts, part)) else parts
+    if not isinstance(part, AbstractTerm):
+        return part
+    changed = {}
+    for name, value in vars(part).items():
+        if name in _static(type(part)) or isinstance(value, tuple | AbstractTerm):
+            new = _renumbered(value, number)
+            if new is not value:
+                changed[name] = new
+    if not changed:
+        return part
+    other = copy.copy(part)
+    for name, value in changed.items():
+        object.__setattr__(other, name, value)
+    return other
+
+
+@cache
+def _static(kind: type) -> frozenset[str]:
+    """The names of a term's fields that are part of its structure."""
+    fields = dataclasses.fields(kind)
+    return frozenset(field.name for field in fields if field.metadata.get("static"))
 
 
 def gather(

@@ -12,7 +12,7 @@ from ..identified import Identified
 from ..models import Model, named
 from ..recording import Recording
 from ..terms.base import AbstractTerm
-from . import verification
+from . import threads, verification
 from .baseline import Baseline, as_given, baseline_of, mismatch, simulated
 from .candidates import OF_THE_MOMENT
 from .contest import contest
@@ -61,7 +61,8 @@ def explain(
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
     chance.
     """
-    with jax.enable_x64(True):  # a few thousand rows: single precision would save nothing
+    # A few thousand rows: single precision would save nothing.
+    with jax.enable_x64(True), threads.single():
         ours, theirs = _double(recording), None if holdout is None else _double(holdout)
         told = _explain(ours, _double(baseline), theirs, fixed, simulate, seed)
     own = recording.time.dtype

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -121,7 +122,7 @@ class FrictionStep(AbstractModulated):
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
         late = time - self.step_time
-        if self.ramp == 0:
+        if not isinstance(self.ramp, jax.Array) and self.ramp == 0:
             return (late > 0).astype(time.dtype)
         return jnp.clip(late / self.ramp + 0.5, 0.0, 1.0)
 
