@@ -79,7 +79,7 @@ class Evidence(NamedTuple):
             some = betas[start : start + most]
             size = PAIR if len(some) <= PAIR else most
             full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
-            plain, momentum = evaluate(term, jnp.asarray(full), self.motion)
+            plain, momentum = evaluate(term, full, self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
         return np.concatenate(parts).transpose(0, 2, 1)
@@ -98,7 +98,7 @@ def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndar
     return np.einsum("...ck,ck->...c", centred, weights)[..., rows]
 
 
-def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
+def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
     """Columns, `(B, p, M)`, and momentum, `None` where there is none, at β, `(B, d)`.
 
     Compiled once for each kind of term and each of the few B: numbers of the recording that are
@@ -111,7 +111,7 @@ def evaluate(term: AbstractTerm, betas: jax.Array, motion: Recording):
         return 1.0
 
     form = _renumbered(term, take)
-    return _compiled(form, betas, jnp.asarray(numbers, betas.dtype), motion)
+    return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
 
 
 def _columns(form, betas, numbers, motion):

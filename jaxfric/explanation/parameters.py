@@ -5,6 +5,7 @@ from collections.abc import Callable
 import jax.numpy as jnp
 import numpy as np
 
+from .. import programs
 from ..effects import Wave, wave
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
@@ -51,6 +52,9 @@ def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[s
     return result
 
 
+_wave = programs.kept(wave)
+
+
 def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
     """Amplitude and phase of every pair of sine and cosine."""
     found = {}
@@ -60,11 +64,7 @@ def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
             continue
         harmonic = name.removesuffix("_sin").partition("_harmonic")[2]
         suffix = f"_harmonic{harmonic}" if harmonic else ""
-        pair = wave(
-            jnp.asarray(values[i]),
-            jnp.asarray(values[i + 1]),
-            jnp.asarray(matrix[i : i + 2, i : i + 2]),
-        )
+        pair = _wave(*map(np.asarray, values[i : i + 2]), matrix[i : i + 2, i : i + 2])
         unit, pair = named[name].unit, Wave(*map(np.asarray, pair))
         found[f"amplitude{suffix}"] = Estimate(pair.amplitude, pair.amplitude_error, unit, freedom)
         found[f"phase{suffix}"] = Estimate(pair.phase, pair.phase_error, "rad", freedom)

@@ -1,6 +1,5 @@
 """Signals that a fit predicts from the motion: what faults of actuator and friction act on."""
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..terms import ActuatorDeadband
@@ -21,9 +20,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if term.coordinates & PREDICTED:
             continue  # a fault acts on what the motion needs, not on itself
-        plain, moving = evaluate(
-            term, jnp.asarray(np.repeat(beta[None], PAIR, axis=0)), evidence.motion
-        )
+        plain, moving = evaluate(term, np.repeat(beta[None], PAIR, axis=0), evidence.motion)
         force = force + alpha @ np.asarray(plain)[0]
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving)[0]
