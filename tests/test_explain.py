@@ -400,6 +400,22 @@ def test_numbers_of_the_recording_are_data_of_a_compiled_term(make, beta, health
     assert len(traced) == 1
 
 
+def test_values_that_do_not_carry_over_are_said_to(healthy):
+    """Where an axis never goes slowly, nothing is missing, but its Stribeck bump is not known."""
+    speed = np.abs(set_point(0)[1])
+    fast = dataclasses.replace(healthy[0], mask=jnp.asarray(speed > 0.05))
+    told = explain(fast, holdout=healthy[1])
+    assert told.verdict == "consistent" and "does not determine the values" in told.summary
+    error, refitted = (told.fit[f"holdout_{key}_error"] for key in ("force", "refitted"))
+    assert error["before"] == error["after"] > 2 * refitted
+    both = explain(healthy[0], holdout=healthy[1])
+    assert both.verdict == "consistent" and "determine" not in both.summary
+    assert both.fit["holdout_force_error"]["before"] == pytest.approx(
+        both.fit["holdout_refitted_error"], rel=0.2
+    )
+    assert explain(healthy[0]).fit["holdout_refitted_error"] is None
+
+
 def test_what_the_motion_has_is_no_tone_but_alone(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
     foreign, own, step = tried(seen)

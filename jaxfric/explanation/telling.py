@@ -289,10 +289,16 @@ def _errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[s
             "after": verification.error(left.last, after, rephased),
         }
 
-    held = None if asked.held is None else pair(asked.held, where.held, left.rephased)
+    held = refitted = None
+    if asked.held is not None:
+        held = pair(asked.held, where.held, left.rephased)
+        if not left.taken:
+            seen = with_predictions(asked.held, first)
+            refitted = verification.error(fit(first.terms, seen, first.betas), asked.held)
     return {
         "force_error": pair(asked.evidence, where.evidence),
         "holdout_force_error": held,
+        "holdout_refitted_error": refitted,
         "simulation_error": None,
         "noise_floor": verification.noise(left.last, where.evidence.target),
     }
