@@ -63,17 +63,24 @@ def kept(*steps: Callable, optimised: int = 0) -> Callable:
 
     Of several steps each takes what the one before returned, then the arguments; while the
     program of one compiles, the next is traced, and compiles beside it. `optimised`: how much XLA
-    optimises programs of few samples that are kept.
+    optimises programs of few samples that are kept; if at all, those that are not kept too.
 
     Only calls with concrete arrays on a single CPU device are kept; any other is as without.
     """
-    compiled = [eqx.filter_jit(step) for step in steps]
+    plain = [eqx.filter_jit(step) for step in steps]
+
+    @cache
+    def quick():
+        options = quick_options(optimised)
+        return [eqx.filter_jit(step, compiler_options=options) for step in steps]
 
     @wraps(steps[-1])
     def call(*arguments):
-        if _store is None or not _simple(arguments):
-            return _in_turn(compiled, arguments)
-        return _in_turn(_programs(steps, arguments, optimised, _store), arguments)
+        if not _simple(arguments):
+            return _in_turn(plain, arguments)
+        if _store is not None:
+            return _in_turn(_programs(steps, arguments, optimised, _store), arguments)
+        return _in_turn(quick() if optimised else plain, arguments)
 
     return call
 

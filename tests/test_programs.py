@@ -143,3 +143,15 @@ def test_the_oldest_programs_go(tmp_path, monkeypatch):
     assert len(files(tmp_path)) == 2
     call(tmp_path, (ARGUMENTS[0], 3, ARGUMENTS[2]))
     assert Traces.count == 0
+
+
+def test_what_is_optimised_a_little_is_so_without_a_folder_too(tmp_path):
+    plain = programs.kept(first, second)
+    little = programs.kept(first, second, optimised=programs.LITTLE)
+    expected = plain(3, ARGUMENTS[0])[0]
+    np.testing.assert_array_equal(little(3, ARGUMENTS[0])[0], expected)
+    # Options of the compiler are for whole programs only; inside another it has none.
+    inside = eqx.filter_jit(lambda pair: little(3, pair)[0])
+    np.testing.assert_array_equal(inside(Pair(jnp.arange(3.0), "a")), expected)
+    with programs.kept_in(tmp_path):
+        np.testing.assert_array_equal(little(3, ARGUMENTS[0])[0], expected)
