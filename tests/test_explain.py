@@ -899,7 +899,10 @@ def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(
 
     # Four times the noise, and beside findings that leave half of the mismatch 1.25 times.
     assert rough(0.09) and not rough(0.07)
-    assert rough(0.06, "spring") and not rough(0.045, "spring")
+    assert rough(0.06, "spring") and not rough(0.044, "spring")
+    # And where they leave more than the geometric mean of mismatch and noise.
+    assert rough(0.046, "spring") and rough(0.033, "spring", floor=0.01)
+    assert not rough(0.03, "spring", floor=0.01) and not rough(0.033, floor=0.01)
     assert not rough(0.06, "spring", floor=0.05)
     # Nothing within a sensor's linearity, 0.2 %.
     assert not rough(0.0019, "spring", before=0.002, floor=1e-4)

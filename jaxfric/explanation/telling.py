@@ -128,7 +128,8 @@ def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
 # part; of four times its size, sixteen times the power, something is missing, wherever.
 ROUGH = 4.0
 # Where the findings leave half of the mismatch's size, a quarter of its power, less will do: more
-# than half as much again as that noise in power.
+# than half as much again as that noise in power. So it will where they leave more than the
+# geometric mean of mismatch and noise.
 HALF_ROUGH, HALF = 1.25, 0.5
 
 
@@ -148,6 +149,9 @@ def _rough(fit: dict[str, Any], named: frozenset[str]) -> bool:
         view["after"] > HALF * view["before"] and above(view, HALF_ROUGH)
         for view in ((here, held) if lasting else (here,))
     )
+    # The findings go from the mismatch to the noise, and less than half the way (in decades).
+    halfway = np.sqrt(here["before"] * fit["noise_floor"])
+    much |= here["after"] > max(halfway, LINEARITY)
     return above(here, ROUGH) or bool(named) and much
 
 
