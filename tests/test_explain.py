@@ -515,6 +515,20 @@ def test_a_bump_that_may_be_nil_in_one_direction_is_told_by_its_most():
     )
 
 
+def test_a_size_that_other_terms_could_stand_in_for_is_told_as_a_bound():
+    def told(error):
+        values = {
+            "amplitude": Estimate(1.2, error, "N"),
+            "friction_period": Estimate(0.51, 0.21, "m"),
+        }
+        return sentence("position_dependent_friction", values, 0.14, ())
+
+    assert "varies along the stroke by at most 2.7 N, with a period of 0.51 m ± 0.42 m" in told(
+        0.75
+    )
+    assert "by 1.20 N ± 0.20 N" in told(0.1)
+
+
 @pytest.mark.parametrize("end", ["", "lower_"])
 def test_an_end_stop_is_told_with_its_place_and_stiffness(end):
     place = Estimate(np.float64(0.2312), np.float64(0.0021), "m")

@@ -82,11 +82,16 @@ def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals)
     return text + "."
 
 
+# Sizes without a sign: where other terms of the model could stand in for all of it, only the most
+# that it may be is known.
+_SIZES = ("stribeck_force", "amplitude", "presliding_force", "backlash_force", "deadband")
+
+
 def _words(name: str, estimate: Estimate) -> str:
-    """A value in words; of a bump that may be nil in this direction the most that it may be."""
+    """A value in words; of a size that may be nil the most that it may be."""
     most = float(estimate.value) + 2 * float(estimate.standard_error)
     nil = abs(float(estimate.value)) <= 2 * float(estimate.standard_error) < math.inf
-    if name.startswith("stribeck_force") and nil:
+    if name.startswith(_SIZES) and nil:
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
     return quantity(estimate)
 
