@@ -16,6 +16,7 @@ from jaxfric.explanation import (
     candidates,
     chance,
     contest,
+    curves,
     evidence,
     explain,
     explaining,
@@ -398,6 +399,23 @@ def test_numbers_of_the_recording_are_data_of_a_compiled_term(make, beta, health
         expected = term.with_beta(jnp.asarray(beta)).columns(motion).T
         np.testing.assert_allclose(plain[1], expected, rtol=1e-12, atol=1e-12)
     assert len(traced) == 1
+
+
+def test_the_map_shows_what_is_in_step_with_acceleration(healthy):
+    """Over position alone such a residual looks like something else."""
+    seen = evidence.gather(healthy[0])
+    seen = predictions.with_predictions(seen, fitted := regression.fit([models.gaussian()], seen))
+    along = np.asarray(seen.motion.position)[seen.centre]
+    slope = predictions.rate(seen, np.asarray(seen.motion.velocity))[seen.centre]
+    slope /= np.sqrt(np.mean(slope**2))
+    before = fitted._replace(residual=np.sin(30 * along) * slope)
+    place = types.SimpleNamespace(coordinate="position_by_acceleration", peak=0.0)
+    units = {"position": "m", "force": "N"}
+    drawn = curves._mapped(place, before, fitted, seen, units)
+    np.testing.assert_allclose(drawn["before"], np.sin(30 * np.asarray(drawn["at"])), atol=0.1)
+    place.coordinate = "position"
+    plain = curves._mapped(place, before, fitted, seen, units)
+    assert not np.allclose(plain["before"], np.sin(30 * np.asarray(plain["at"])), atol=0.4)
 
 
 def test_values_that_do_not_carry_over_are_said_to(healthy):

@@ -7,7 +7,7 @@ import numpy as np
 from ..models import Model
 from .evidence import Evidence
 from .locate import Place, coordinates
-from .predictions import with_predictions
+from .predictions import rate, with_predictions
 from .regression import Fit
 from .verification import residual
 
@@ -49,12 +49,16 @@ def curves(
 
 
 def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dict[str, Any]:
-    """Mean residual in bins along one coordinate; a line is folded onto one period."""
+    """Mean residual in bins along one coordinate; a line is folded onto one period.
+
+    Of a residual in step with something else (direction, velocity, acceleration) its size where
+    that has its root mean square.
+    """
     name = place.coordinate
     if name.endswith("_lines"):
         stem = name.removesuffix("_lines")
         value = np.asarray(getattr(seen.motion, stem))[seen.centre]
-        side = np.ones_like(value)
+        beside = np.ones_like(value)
         period = 1 / place.peak
         value = np.mod(value, period)
         unit = units["position"] if stem == "position" else "s"
@@ -62,28 +66,41 @@ def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dic
     else:
         nodes = coordinates(seen)[name][0]
         value, label = nodes[seen.centre], name.replace("_", " ")
-        sided = "direction" in name or "since" in name
-        side = seen.side if sided else np.ones_like(value)
-        stem = name.removesuffix("_by_direction").removesuffix("_by_acceleration")
+        beside = _beside(name, seen)
+        stem = name.partition("_by_")[0]
         unit = _UNITS.get(stem, "s").format(**units)
     edges = np.quantile(value, np.linspace(0, 1, BINS + 1))
     bin_ = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, BINS - 1)
     count = np.bincount(bin_, minlength=BINS)
-    full = count > 1
-    count = np.where(full, count, 1)
+    weight = np.bincount(bin_, beside**2, BINS)
+    full = (count > 1) & (weight > 0)
+    count, weight = np.where(full, count, 1), np.where(full, weight, 1.0)
 
     def mean(values):
-        return (np.bincount(bin_, side * values, BINS) / count)[full]
+        return (np.bincount(bin_, beside * values, BINS) / weight)[full]
 
-    spread = np.sqrt(np.bincount(bin_, before.residual**2, BINS) / count) / np.sqrt(count)
+    spread = np.sqrt(np.bincount(bin_, before.residual**2, BINS) / count / weight)
     return {
         "coordinate": label,
         "unit": unit,
-        "at": mean(value / np.where(side == 0, 1.0, side)).tolist(),
+        "at": (np.bincount(bin_, value, BINS) / count)[full].tolist(),
         "before": mean(before.residual).tolist(),
         "after": mean(after.residual).tolist(),
         "error": spread[full].tolist(),
     }
+
+
+def _beside(name: str, seen: Evidence) -> np.ndarray:
+    """What a residual over that coordinate is in step with, in parts of its root mean square."""
+    velocity = np.asarray(seen.motion.velocity)
+    if name.endswith("_by_velocity"):
+        values = velocity[seen.centre]
+    elif name.endswith("_by_acceleration"):
+        values = rate(seen, velocity)[seen.centre]
+    else:
+        sided = name.endswith("_by_direction") or "since" in name
+        values = seen.side if sided else np.ones(len(seen.centre))
+    return values / np.sqrt(np.mean(values**2))
 
 
 def _series(evidence: Evidence, before: Fit, after: Fit, rephased=frozenset()) -> dict[str, Any]:

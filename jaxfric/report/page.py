@@ -42,6 +42,7 @@ th { font-weight: 600; font-size: .85rem; color: #444; border-bottom-color: #888
 td.number, th.number { text-align: right; white-space: nowrap;
   font-variant-numeric: tabular-nums; }
 .note { color: #555; font-size: .9rem; margin: .2rem 0 .6rem; } code { font-size: .9em; }
+@media screen { section { overflow-x: auto; } }
 @media print { body { max-width: none; padding: 0; font-size: 11pt; }
   section { break-inside: avoid; } h2 { break-after: avoid; } .modebar { display: none; }
   .verdict { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
@@ -226,7 +227,10 @@ def _parameters(document: Mapping[str, Any]) -> str:
         for name, entry in (entries or {}).items()
     ]
     head = ("of", "parameter", "value", "± 95 %", "unit")
-    note = "The interval is two standard errors to either side."
+    note = (
+        "The interval is two standard errors to either side; the baseline's values are those "
+        "without the findings."
+    )
     return _section("Parameters", _table(head, rows, (2, 3)), note)
 
 
