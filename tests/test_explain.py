@@ -924,10 +924,11 @@ def test_findings_bring_a_model_nearer_to_the_held_out_recording(healthy, monkey
 
 
 def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows():
-    def rough(after, *named, before=0.1, floor=0.02, held=None):
+    def rough(after, *named, before=0.1, floor=0.02, held=None, moment=0.9):
         fit = {"force_error": {"before": before, "after": after}, "noise_floor": floor}
         fit["holdout_force_error"] = held and {"before": 0.1, "after": held}
-        return telling._rough(fit, frozenset(named))
+        shares = {name: moment if name == "friction_step" else 0.1 for name in named}
+        return telling._rough(fit, shares)
 
     # Four times the noise, and beside findings that leave half of the mismatch 1.25 times.
     assert rough(0.09) and not rough(0.07)
@@ -941,6 +942,9 @@ def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(
     # The held-out recording has to be explained as well, but for what belongs to a moment.
     assert rough(0.03, "spring", held=0.06) and not rough(0.03, "spring", held=0.04)
     assert not rough(0.03, held=0.09) and not rough(0.03, "spring", "friction_step", held=0.09)
+    # That excuses there no more than half as much again as it takes here.
+    assert not rough(0.03, "friction_step", held=0.06, moment=0.2)
+    assert rough(0.03, "friction_step", held=0.06, moment=0.1)
 
 
 def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch):

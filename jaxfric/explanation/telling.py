@@ -53,6 +53,9 @@ def tell(
         after = _lasting(after, left.last, where)
     findings = _findings(found, asked, rest, first)
     standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
+    shares: dict[str, float] = {}
+    for finding in findings:
+        shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
     values = spelled.estimates(found.base, asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
@@ -62,7 +65,7 @@ def tell(
     )
     errors = _errors(asked, first, *rest)
     return Explanation(
-        verdict=_verdict(findings, before, after, _rough(errors, found.names), standing),
+        verdict=_verdict(findings, before, after, _rough(errors, shares), standing),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=errors,
@@ -133,26 +136,31 @@ ROUGH = 4.0
 HALF_ROUGH, HALF = 1.25, 0.5
 
 
-def _rough(fit: dict[str, Any], named: frozenset[str]) -> bool:
+def _rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or much of it all.
 
-    What is `named` has to explain the held-out recording as well, unless it belongs to a moment;
-    where nothing is, any base that has to extrapolate may miss that by more.
+    What is named (`shares` by effect) has to explain the held-out recording as well. What belongs
+    to a moment excuses there as much as it takes here, and half as much again; where nothing is
+    named, any base that has to extrapolate may miss that by more.
     """
     here, held = fit["force_error"], fit["holdout_force_error"]
 
     def above(view, size: float) -> bool:
         return view["after"] > max(size * fit["noise_floor"], LINEARITY)
 
-    lasting = held is not None and not named & OF_THE_MOMENT
-    much = any(
-        view["after"] > HALF * view["before"] and above(view, HALF_ROUGH)
-        for view in ((here, held) if lasting else (here,))
-    )
+    def left(view) -> float:
+        return (view["after"] / max(view["before"], 1e-300)) ** 2
+
+    much = [here]
+    if held is not None:
+        momentary = [share for name, share in shares.items() if name in OF_THE_MOMENT]
+        excused = HALF_ROUGH**2 * (left(here) + sum(momentary)) if momentary else 0.0
+        much += [held] if left(held) > excused else []
     # The findings go from the mismatch to the noise, and less than half the way (in decades).
     halfway = np.sqrt(here["before"] * fit["noise_floor"])
-    much |= here["after"] > max(halfway, LINEARITY)
-    return above(here, ROUGH) or bool(named) and much
+    many = any(left(view) > HALF**2 and above(view, HALF_ROUGH) for view in much)
+    many |= here["after"] > max(halfway, LINEARITY)
+    return bool(above(here, ROUGH) or (shares and many))
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
