@@ -44,8 +44,8 @@ def draws(asked):
     field = asked.field
     judge = chance.Judge(asked.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
     scans = [
-        judge(field.columns(i, seen), candidate.effect.positive)
-        for i, candidate in enumerate(field.candidates)
+        judge(field.columns(candidate, seen), candidate.effect.positive)
+        for candidate in field.candidates
     ]
     names = [candidate.effect.name for candidate in field.candidates]
     winner = int(np.argmax([scan.gain[scan.best] for scan in scans]))
@@ -64,14 +64,14 @@ def turns():
     for axis, effects, title in zip(
         axes, (("presliding",), ()), ("yields: presliding", "sticks"), strict=True
     ):
-        machine = concealed.draw(100, effects, 0.15)
+        machine = concealed.draw(122, effects, 0.15)
         motion = question.from_position(concealed.record(machine).recording)
         seen = evidence.gather(motion)
         base = regression.fit([named(machine.baseline)], seen)
         for at, level in reversals.passages(motion, seen, base):
             way = np.asarray(motion.position)[at]
             axis.plot(level, 1e6 * (way - way.mean()), lw=0.7)
-        axis.set(title=title, xlabel="force, parts of the friction level")
+        axis.set(title=title, xlabel="force, parts of the friction level", xticks=(-0.5, 0, 0.5))
     axes[0].set_ylabel("position, µm")
     save(figure, "reversals")
 

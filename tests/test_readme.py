@@ -1,5 +1,6 @@
 """What the README and CONTRIBUTING show works as shown."""
 
+import importlib
 import re
 import tomllib
 from pathlib import Path
@@ -8,6 +9,7 @@ import jax
 import pytest
 
 ROOT = Path(__file__).parents[1]
+METHOD = "jaxfric/explanation/METHOD.md"
 PAGES = ["README.md", "CONTRIBUTING.md"]
 
 
@@ -28,9 +30,10 @@ def test_python_blocks_run_one_after_the_other(page, capsys):
 
 
 def test_links_lead_to_files():
-    for page in PAGES:
-        for link in re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / page).read_text("utf-8")):
-            assert (ROOT / link).exists(), f"{page} links to {link}, which is not there"
+    for page in [*PAGES, METHOD]:
+        path = ROOT / page
+        for link in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text("utf-8")):
+            assert (path.parent / link).exists(), f"{page} links to {link}, which is not there"
 
 
 def test_the_extras_named_are_those_there_are():
@@ -47,3 +50,16 @@ def test_paths_and_options_of_the_commands_exist():
     for command in blocks("CONTRIBUTING.md", "sh"):
         for path in re.findall(r"(?<!\S)((?:tests|benchmarks|\.ci)(?:/[\w./]+)?)", command):
             assert (ROOT / path).exists(), path
+
+
+@pytest.mark.slow
+def test_the_pictures_of_the_method_are_drawn(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    monkeypatch.syspath_prepend(ROOT / "benchmarks")
+    script = importlib.import_module("method_pictures")
+    monkeypatch.setattr(script, "FOLDER", tmp_path)
+    with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
+        script.main()
+    told = re.findall(r"\]\(pictures/(\w+\.svg)\)", (ROOT / METHOD).read_text("utf-8"))
+    assert sorted(told) == sorted(path.name for path in tmp_path.iterdir())
+    assert all(path.stat().st_size > 10_000 for path in tmp_path.iterdir())
