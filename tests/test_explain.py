@@ -627,6 +627,57 @@ def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
         assert (telling._lasting([spot], asked.base, asked) == [spot]) is there
 
 
+def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(healthy):
+    """Of the places of the narrow rows, the wide ones keep the curve that is there."""
+    run, asked = healthy[0], question.ask(healthy[0], None, models.named("gaussian"))
+    pull = 2 * np.tanh(np.gradient(np.gradient(np.asarray(run.position), TIME), TIME))
+    pulled = question.ask(
+        dataclasses.replace(run, force=run.force + pull), None, models.named("gaussian")
+    )
+    judged = {}
+    for name, of in (("healthy", asked), ("pulled", pulled)):
+        seen = predictions.with_predictions(of.evidence, of.base)
+        places = [p for p in locate.locate(seen, of.base) if p.coordinate in locate.NOISY]
+        assert {p.coordinate for p in places} == locate.NOISY
+        plain = places[0]._replace(coordinate="velocity")
+        kept = telling._through_wide([*places, plain], of.base, of.wide, 0)
+        judged[name] = {p.coordinate for p in kept}
+        assert telling._through_wide(places, of.base, None, 0) == places
+    assert judged["healthy"] == {"velocity"}
+    assert judged["pulled"] >= {"velocity", "acceleration"}
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "curve", "detail"),
+    [
+        ("position", ([0.0, 0.12], [1.0, -3.0]), "strongest at 0.12 mm"),
+        ("acceleration", ([0.0, 5.0], [1.0, 3.0]), "strongest at 5 mm/s²"),
+        ("temperature", ([20.0, 30.0], [1.0, 3.0]), "strongest at 30"),
+        ("time_since_reversal", ([0.0, 0.03], [1.0, 3.0]), "strongest at 0.03 s"),
+        ("position_lines", ([], []), "period 2.5 mm"),
+        ("time_lines", ([], []), "0.4 Hz"),
+        ("force_rate", ([0.0, 1.0], [0.002]), "the force acts 0.002 s late"),
+        ("force_rate", ([0.0, 1.0], [-0.002]), "the force acts 0.002 s early"),
+    ],
+)
+def test_a_place_is_told_with_its_unit(coordinate, curve, detail):
+    curve = tuple(np.array(values) for values in curve)
+    place = locate.Place(coordinate, 0.5, 1.0, 0.002, 0.4, curve)
+    assert telling._where(place, {"force": "N", "position": "mm"})["detail"] == detail
+
+
+def test_the_map_of_a_late_force_is_over_its_rate(healthy):
+    seen = evidence.gather(healthy[0])
+    seen = predictions.with_predictions(seen, fitted := regression.fit([models.gaussian()], seen))
+    force = np.asarray(seen.motion.channels["predicted_force"])
+    rate = predictions.rate(seen, force)[seen.centre]
+    place = types.SimpleNamespace(coordinate="force_rate", peak=0.0)
+    units = {"position": "m", "force": "N"}
+    drawn = curves._mapped(place, fitted._replace(residual=0.01 * rate), fitted, seen, units)
+    np.testing.assert_allclose(drawn["before"], 0.01 * np.asarray(drawn["at"]), rtol=1e-9)
+    assert drawn["unit"] == "N/s"
+
+
 def test_a_moment_counts_on_a_recording_in_which_it_returns(healthy):
     gaussian, step, spot = models.named("gaussian"), CASES["friction_step"], CASES["sticky_spot"]
     known = question.ask(*healthy, gaussian)

@@ -1,5 +1,6 @@
 """What the pictures of an explanation are drawn from, as plain lists."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,14 +16,22 @@ BINS = 48
 # More points than a screen has columns show nothing more.
 MOST_POINTS = 3000
 _UNITS = {
+    "time": "s",
+    "time_since_reversal": "s",
     "position": "{position}",
     "velocity": "{position}/s",
     "distance_since_reversal": "{position}",
     "acceleration": "{position}/s²",
     "predicted_force": "{force}",
-    "force_rate": "{force}",
+    "force_rate": "{force}/s",
     "neighbour": "{position}/s",
 }
+
+
+def unit(coordinate: str, units: Mapping[str, str]) -> str:
+    """The unit of a coordinate; empty for a signal whose unit nobody gave (load, temperature)."""
+    stem = coordinate.removesuffix("_lines").partition("_by_")[0]
+    return _UNITS.get(stem, "").format(**units)
 
 
 def curves(
@@ -31,7 +40,7 @@ def curves(
     after: Fit,
     evidence: Evidence,
     held: Evidence | None,
-    units: dict[str, str],
+    units: Mapping[str, str],
     models: tuple[Model, Model],
     rephased: frozenset[int] = frozenset(),
 ) -> dict[str, Any]:
@@ -61,14 +70,12 @@ def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dic
         beside = np.ones_like(value)
         period = 1 / place.peak
         value = np.mod(value, period)
-        unit = units["position"] if stem == "position" else "s"
-        label = f"{stem}, folded at {period:.4g} {unit}"
+        label = f"{stem}, folded at {period:.4g} {unit(name, units)}"
     else:
-        nodes = coordinates(seen)[name][0]
-        value, label = nodes[seen.centre], name.replace("_", " ")
+        nodes, _, kind = coordinates(seen)[name]
+        value = (rate(seen, nodes) if kind == "rate" else nodes)[seen.centre]
+        label = name.replace("_", " ")
         beside = _beside(name, seen)
-        stem = name.partition("_by_")[0]
-        unit = _UNITS.get(stem, "s").format(**units)
     edges = np.quantile(value, np.linspace(0, 1, BINS + 1))
     bin_ = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, BINS - 1)
     count = np.bincount(bin_, minlength=BINS)
@@ -82,7 +89,7 @@ def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dic
     spread = np.sqrt(np.bincount(bin_, before.residual**2, BINS) / count / weight)
     return {
         "coordinate": label,
-        "unit": unit,
+        "unit": unit(name, units),
         "at": (np.bincount(bin_, value, BINS) / count)[full].tolist(),
         "before": mean(before.residual).tolist(),
         "after": mean(after.residual).tolist(),

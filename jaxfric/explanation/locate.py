@@ -160,14 +160,14 @@ def since_reversal(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
     return time - time[last], way - way[last]
 
 
-# Coordinates with the encoder's noise in them, twice differentiated: where most samples share a
-# value, knots at its quantiles would resolve that noise, which is in the residual too.
-_NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direction"})
+# Coordinates with the encoder's noise in them, differentiated twice or more, which is in the
+# residual too. Where most samples share a value, knots at its quantiles would resolve that noise.
+NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direction", "force_rate"})
 
 
 def _knots(name: str, values: np.ndarray) -> np.ndarray:
     places = np.quantile(values, _EARLY if "since" in name else _EVEN)
-    if name in _NOISY:
+    if name in NOISY:
         low, high = np.quantile(values, [0.01, 0.99])
         places = np.linspace(low, high, KNOTS)
     width = places[-1] - places[0]

@@ -12,10 +12,10 @@ from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, at_values
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
-from .curves import curves
+from .curves import curves, unit
 from .evidence import Evidence
 from .explained import Explanation, Finding, Moved
-from .locate import Place, locate, repeated
+from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
 from .question import Question
@@ -102,17 +102,18 @@ def _shown(places: list[Place], least: float, force: float) -> list[Place]:
 
 
 def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) -> list[Place]:
-    """Without the force's rate, if a kernel of twice the width does not show it.
+    """Without what a kernel of twice the width does not show of the coordinates that hold noise.
 
-    It holds the derivative of the acceleration, whose noise is in the residual too.
+    They hold the acceleration or its derivative, whose noise is in the residual too, by the loop's
+    answer to the encoder: a curve over them that follows that noise alone, and in power is 2⁵ to
+    2⁷ times weaker there.
     """
-    if wide is None or not any(place.coordinate == "force_rate" for place in places):
+    if wide is None or not any(place.coordinate in NOISY for place in places):
         return places
     again = fit(now.terms, with_predictions(wide, now), now.betas, 4)
-    there = {p.coordinate: p for p in locate(with_predictions(wide, again), again, seed)}
-    rate = there["force_rate"]
-    sure = rate.p_value <= LEVEL and rate.share >= LEAST_SHARE
-    return [place for place in places if sure or place.coordinate != "force_rate"]
+    there = locate(with_predictions(wide, again), again, seed)
+    sure = {p.coordinate for p in there if p.p_value <= LEVEL and p.share >= LEAST_SHARE}
+    return [p for p in places if p.coordinate not in NOISY or p.coordinate in sure]
 
 
 def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
@@ -276,15 +277,18 @@ def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list
 
 
 def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
-    detail = ""
+    detail, its = "", unit(place.coordinate, units)
     if place.coordinate == "position_lines":
-        detail = f"period {1 / place.peak:.4g} {units['position']}"
+        detail = f"period {1 / place.peak:.4g} {its}"
     elif place.coordinate == "time_lines":
         detail = f"{place.peak:.4g} Hz"
+    elif place.coordinate == "force_rate":
+        late = float(place.curve[1][0])
+        detail = f"the force acts {abs(late):.2g} s {'late' if late > 0 else 'early'}"
     elif len(place.curve[0]):
         at, height = place.curve
         peak = int(np.argmax(np.abs(height)))
-        detail = f"strongest at {at[peak]:.3g}"
+        detail = f"strongest at {at[peak]:.3g} {its}".rstrip()
     return {
         "coordinate": place.coordinate.removesuffix("_lines"),
         "share": place.share,
