@@ -8,6 +8,7 @@ import pytest
 
 from jaxfric import concealed, models
 from jaxfric.catalogue import CATALOGUE
+from jaxfric.concealed import drawing, tuning
 from jaxfric.concealed.kinds import KINDS
 from jaxfric.concealed.nominal import friction, rms
 from jaxfric.concealed.tuning import in_loop
@@ -161,3 +162,31 @@ def test_what_cannot_be_concealed_is_said():
         concealed.draw(0, ("rust",))
     with pytest.raises(ValueError, match="named twice"):
         concealed.draw(0, ("spring", "spring"))
+
+
+@pytest.mark.slow
+def test_a_loop_that_bursts_is_made_slower():
+    """With a gap in front of an inertia that varies, this one did: no number was left of it."""
+    effects = "position_dependent_inertia", "backlash"
+    machine = concealed.draw(1493997760, effects, (0.1, 0.3))
+    assert machine.physics["kp"] < 0.1 * concealed.draw(1493997760).physics["kp"]
+    assert all(truth["size"] < 0.4 for truth in machine.truth.values())
+    run = concealed.record(machine)
+    for recording in (run.recording, run.holdout):
+        position, wanted = recording.position, recording.channels["reference"]
+        assert np.max(np.abs(position - wanted)) < 0.3 * np.ptp(position)
+        assert np.isfinite(recording.force).all()
+
+
+def test_a_loop_that_bursts_however_slow_is_said(monkeypatch):
+    tried = []
+
+    def burst(machine, name, truth, n, size):
+        tried.append(machine.physics["kp"])
+        return truth | {"size": tuning.BURST}
+
+    monkeypatch.setattr(drawing, "tune", burst)
+    with pytest.raises(ValueError, match="loop of machine 3 with backlash bursts"):
+        concealed.draw(3, ("backlash",))
+    assert len(tried) > 1
+    assert tried == sorted(tried, reverse=True)

@@ -1,5 +1,6 @@
 """Drawing a machine, and what is concealed in it, from a seed."""
 
+import copy
 import dataclasses
 import zlib
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from .machines import (
 )
 from .nominal import nominal
 from .physics import ABSENT
-from .tuning import tune
+from .tuning import BURST, tune
 
 # What the phase of the loop, or a large force of inertia, makes visible.
 _DYNAMIC = {
@@ -31,6 +32,8 @@ _DYNAMIC = {
     "gain_asymmetry", "acceleration_dependent_friction", "actuator_deadband",
 }  # fmt: skip
 _PHASE = {"transport_delay", "actuator_lag", "position_dependent_delay"}
+# How often a loop that bursts is made half as fast before it is given up.
+_SLOWER = 4
 
 
 def draw(
@@ -45,7 +48,10 @@ def draw(
     one number, or the range of a log-uniform draw. What would not be physical any more is not
     made, so that the size in `Machine.truth` can be smaller.
 
-    **Raises:** `ValueError` for an effect that there is none of, or one named twice.
+    A loop that bursts with the effect is made slower.
+
+    **Raises:** `ValueError` for an effect that there is none of, or one named twice, or for a loop
+    that bursts however slow.
     """
     effects = tuple(effects)
     _check(effects)
@@ -61,19 +67,29 @@ def draw(
     if "frictional_lag" in effects:
         friction = _pronounced(friction, coulomb, top)
     omega = draw_band(rng, plan, slowest=bool(_PHASE & set(effects)))
-    # Coulomb friction may bend the loop by a twentieth of the stroke.
-    mass = max(_mass(rng, v, time, coulomb, effects), 20 * coulomb / (plan.stroke * omega**2))
-    loop, noise = draw_loop(rng, mass, coulomb, omega, plan)
-    physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
-    # Far above what the motion needs: a limit that is met would be an effect of its own.
-    hardest = mass * float(np.quantile(np.abs(np.gradient(v, time)), 0.999))
-    physics["limit"] = 8 * coulomb + 3 * hardest
     baseline = shape if shape and "stribeck" not in effects else "coulomb-viscous"
     if "asymmetric_friction" in effects:
         baseline = f"symmetric-{baseline}"
-    blur = draw_noise(rng, coulomb, noise)
-    healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {})
-    return _with(healthy, effects, nominal(time, x, v, coulomb, physics, plan), size)
+
+    def driven(rng, omega) -> Machine:
+        # Coulomb friction may bend the loop by a twentieth of the stroke.
+        mass = max(_mass(rng, v, time, coulomb, effects), 20 * coulomb / (plan.stroke * omega**2))
+        loop, noise = draw_loop(rng, mass, coulomb, omega, plan)
+        physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
+        # Far above what the motion needs: a limit that is met would be an effect of its own.
+        hardest = mass * float(np.quantile(np.abs(np.gradient(v, time)), 0.999))
+        physics["limit"] = 8 * coulomb + 3 * hardest
+        blur = draw_noise(rng, coulomb, noise)
+        healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {})
+        return _with(healthy, effects, nominal(time, x, v, coulomb, physics, plan), size)
+
+    for _ in range(_SLOWER):
+        machine = driven(copy.deepcopy(rng), omega)
+        if all(truth["size"] < BURST for truth in machine.truth.values()):
+            return machine
+        # Nobody runs a loop that bursts: whoever tunes it lowers its gains.
+        omega /= 2
+    raise ValueError(f"The loop of machine {seed} with {', '.join(effects)} bursts.")
 
 
 def _with(machine: Machine, effects, n, size) -> Machine:

@@ -20,6 +20,8 @@ _ROUNDS = 4
 # sizes so far apart it says little.
 _HARDLY = 0.1
 _FAR = 10.0
+# The size of an effect with which the loop bursts, in parts of the Coulomb level.
+BURST = 1e3
 
 
 def tune(machine: Machine, name: str, truth: Truth, n: Nominal, size: float) -> Truth:
@@ -74,9 +76,10 @@ def _sizes(machine, name, truths):
         for truth in truths
     ]
     found = simulate([(twin, 0) for twin in twins])
-    sizes = np.array([in_loop(machine, name, f.hidden[name], f.true.velocity) for f in found])
     # A loop that bursts is too large an effect.
-    return np.clip(np.nan_to_num(sizes, nan=np.inf), 1e-6, 1e3)
+    with np.errstate(over="ignore", invalid="ignore"):
+        sizes = np.array([in_loop(machine, name, f.hidden[name], f.true.velocity) for f in found])
+    return np.clip(np.nan_to_num(sizes, nan=np.inf), 1e-6, BURST)
 
 
 def in_loop(machine: Machine, name: str, force: np.ndarray, velocity: np.ndarray) -> float:
