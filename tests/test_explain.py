@@ -639,9 +639,14 @@ def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(h
         seen = predictions.with_predictions(of.evidence, of.base)
         places = [p for p in locate.locate(seen, of.base) if p.coordinate in locate.NOISY]
         assert {p.coordinate for p in places} == locate.NOISY
+        noise = regression.fast(of.base)
+        places = [p._replace(size=noise) for p in places]
         plain = places[0]._replace(coordinate="velocity")
         kept = telling._through_wide([*places, plain], of.base, of.wide, 0)
         judged[name] = {p.coordinate for p in kept}
+        # What is larger than the noise is no part of it.
+        large = [p._replace(size=1.1 * noise) for p in places if p.coordinate != "force_rate"]
+        assert telling._through_wide(large, of.base, of.wide, 0) == large
         assert telling._through_wide(places, of.base, None, 0) == places
     assert judged["healthy"] == {"velocity"}
     assert judged["pulled"] >= {"velocity", "acceleration"}

@@ -104,16 +104,23 @@ def _shown(places: list[Place], least: float, force: float) -> list[Place]:
 def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) -> list[Place]:
     """Without what a kernel of twice the width does not show of the coordinates that hold noise.
 
-    They hold the acceleration or its derivative, whose noise is in the residual too, by the loop's
-    answer to the encoder: a curve over them that follows that noise alone, and in power is 2⁵ to
-    2⁷ times weaker there.
+    They hold the acceleration, whose noise is in the residual too, by the loop's answer to the
+    encoder: a curve over them that follows that noise alone, and in power is 2⁵ to 2⁷ times weaker
+    there. Not asked is what is larger than all that differs from row to row, but the force's rate,
+    which holds the acceleration's derivative.
     """
-    if wide is None or not any(place.coordinate in NOISY for place in places):
+    noise = fast(now)
+
+    def doubted(place: Place) -> bool:
+        rate = place.coordinate == "force_rate"
+        return rate or (place.coordinate in NOISY and place.size <= noise)
+
+    if wide is None or not any(map(doubted, places)):
         return places
     again = fit(now.terms, with_predictions(wide, now), now.betas, 4)
     there = locate(with_predictions(wide, again), again, seed)
     sure = {p.coordinate for p in there if p.p_value <= LEVEL and p.share >= LEAST_SHARE}
-    return [p for p in places if p.coordinate not in NOISY or p.coordinate in sure]
+    return [p for p in places if p.coordinate in sure or not doubted(p)]
 
 
 def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
