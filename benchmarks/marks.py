@@ -15,9 +15,10 @@ import jax.numpy as jnp
 import numpy as np
 import peers
 
-from jaxfric import compress, identify
-from jaxfric.projections import ClosedWindows
-from jaxfric.recording import stack
+from jaxfric import identify
+from jaxfric.data.recording import stack
+from jaxfric.identification import compress
+from jaxfric.identification.projections import ClosedWindows
 
 
 def compiled(function, *arguments):

@@ -10,11 +10,11 @@ import jax
 import matplotlib.pyplot as plt
 import numpy as np
 
-from jaxfric import concealed
 from jaxfric.cli.demo import EFFECT, SEED, SIZE
 from jaxfric.explanation import chance, evidence, question, regression, reversals
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.models import named
+from jaxfric.validation import concealed
 
 FOLDER = Path(__file__).parents[1] / "jaxfric" / "explanation" / "pictures"
 

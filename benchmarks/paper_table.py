@@ -14,9 +14,9 @@ import jax
 import jax.numpy as jnp
 from problem_p import curve_distance, curve_error, problem_p
 
-from jaxfric import scenario
-from jaxfric.control import Encoder
-from jaxfric.identification import identify
+from jaxfric.identification.identifying import identify
+from jaxfric.simulation import scenario
+from jaxfric.simulation.control import Encoder
 
 MODELS = {"ACVM": "coulomb-viscous", "AGM": "gaussian", "ALM": "lorentzian"}
 LOW, HIGH = 0.002, 0.18

@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.optimize
 
-from jaxfric import reduced
-from jaxfric.identification import _solve, _without_inertia
+from jaxfric.data.recording import Recording
+from jaxfric.identification import reduced
+from jaxfric.identification.identifying import _solve, _without_inertia
+from jaxfric.identification.projections import ClosedWindows
+from jaxfric.identification.search import search
 from jaxfric.models import named
-from jaxfric.projections import ClosedWindows
-from jaxfric.recording import Recording
-from jaxfric.search import search
 from jaxfric.signals import prepare, scales
 from jaxfric.terms.base import bounds
 

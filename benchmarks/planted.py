@@ -19,11 +19,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import recordings
 
-from jaxfric import proof
 from jaxfric.cli import _configure, options
-from jaxfric.io import write_text
-from jaxfric.proof import comparing, planting
-from jaxfric.proof.writing import rates, table
+from jaxfric.data.io import write_text
+from jaxfric.validation import proof
+from jaxfric.validation.proof import comparing, planting
+from jaxfric.validation.proof.writing import rates, table
 
 METHOD = """\
 To the recorded force of a real machine the force of one effect is added, computed from the recorded

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import optimistix as optx
 
 from jaxfric import models, signals
-from jaxfric.reduced import least_squares
+from jaxfric.identification.reduced import least_squares
 from jaxfric.terms.base import Directional, Sum
 
 

@@ -32,17 +32,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 import peer_methods as methods
 
-from jaxfric import concealed, models
+from jaxfric import models
 from jaxfric.cli import _configure
+from jaxfric.data.io import write_text
 from jaxfric.explanation import verification
 from jaxfric.explanation.contest import contest
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.question import ask, opened
-from jaxfric.io import write_text
-from jaxfric.proof.counting import middle, rate
-from jaxfric.proof.planning import PATTERN
-from jaxfric.proof.scoring import LEAST_REDUCTION
-from jaxfric.proof.writing import share, table
+from jaxfric.validation import concealed
+from jaxfric.validation.proof.counting import middle, rate
+from jaxfric.validation.proof.planning import PATTERN
+from jaxfric.validation.proof.scoring import LEAST_REDUCTION, held_out
+from jaxfric.validation.proof.writing import share, table
 
 HARMONICS = 20
 # What a column of each family could stand for.
@@ -196,7 +197,7 @@ def explained(answer):
     """What `explain` said, in the form of the others; `None` where it has no answer."""
     if answer["error"] is not None:
         return None
-    held = answer["fit"]["holdout_force_error"]
+    held = held_out(answer["fit"])
     named = [[finding["effect"]] for finding in answer["findings"]]
     return {"named": named, "after": held["after"]}
 
@@ -246,7 +247,7 @@ def collected(folder, file, wanted):
     if open_:
         said |= judge(case, open_)
         write_text(kept, json.dumps(said))
-    before = answer["fit"]["holdout_force_error"]["before"]
+    before = held_out(answer["fit"])["before"]
     measures = {"before": before, "oracle": answer["oracle"]}
     return case | measures | {"said": said | {"explain": ours}}
 

@@ -22,7 +22,7 @@ import recordings
 from jaxfric import read
 from jaxfric.cli import _configure
 from jaxfric.explanation import explain
-from jaxfric.proof.writing import table
+from jaxfric.validation.proof.writing import table
 
 # Published with the benchmark, of inverse dynamics with direction-dependent friction, N and N·s/m.
 PUBLISHED = {"coulomb+": 20.1440, "coulomb-": 20.6277, "viscous+": 166.7061, "viscous-": 240.4236}

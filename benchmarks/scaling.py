@@ -14,7 +14,7 @@ import numpy as np
 import peers
 from marks import alternately, compiled
 
-from jaxfric import compress
+from jaxfric.identification import compress
 
 PICTURE = Path(__file__).parent / "pictures" / "scaling.png"
 SAMPLES = (500, 2000, 8000, 32_000, 128_000)

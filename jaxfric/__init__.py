@@ -9,41 +9,52 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import (
-        devices as devices,
         export as export,
         fleet as fleet,
         models as models,
-        scenario as scenario,
         signals as signals,
+        simulators as simulators,
         terms as terms,
     )
-    from .control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
+    from .data.io import read as read
+    from .data.recording import Recording as Recording, pad as pad, stack as stack
     from .explanation import Explanation as Explanation, explain as explain
-    from .identification import identify as identify
-    from .identified import Identified as Identified, Result as Result
-    from .io import read as read
+    from .identification import devices as devices
+    from .identification.identified import Identified as Identified, Result as Result
+    from .identification.identifying import identify as identify
+    from .identification.projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
+    from .identification.selection import Selection as Selection, select as select
+    from .identification.uncertainty import Estimate as Estimate
     from .models import Model as Model
-    from .prediction import predict as predict
-    from .projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
-    from .recording import Recording as Recording, pad as pad, stack as stack
-    from .selection import Selection as Selection, select as select
-    from .simulation import simulate as simulate
-    from .uncertainty import Estimate as Estimate
+    from .simulation import scenario as scenario
+    from .simulation.control import PD as PD, PID as PID, Cascade as Cascade, Encoder as Encoder
+    from .simulation.prediction import predict as predict
+    from .simulation.simulating import simulate as simulate
 
-_MODULES = ("devices", "export", "fleet", "models", "scenario", "signals", "terms")
+# Public modules and names, by the package or module that holds them.
+_MODULES = {
+    "devices": "identification.devices",
+    "export": "export",
+    "fleet": "fleet",
+    "models": "models",
+    "scenario": "simulation.scenario",
+    "signals": "signals",
+    "simulators": "simulators",
+    "terms": "terms",
+}
 _NAMES = {
-    "control": ("PD", "PID", "Cascade", "Encoder"),
+    "data.io": ("read",),
+    "data.recording": ("Recording", "pad", "stack"),
     "explanation": ("Explanation", "explain"),
-    "identification": ("identify",),
-    "identified": ("Identified", "Result"),
-    "io": ("read",),
+    "identification.identified": ("Identified", "Result"),
+    "identification.identifying": ("identify",),
+    "identification.projections": ("ClosedWindows", "WeakForm"),
+    "identification.selection": ("Selection", "select"),
+    "identification.uncertainty": ("Estimate",),
     "models": ("Model",),
-    "prediction": ("predict",),
-    "projections": ("ClosedWindows", "WeakForm"),
-    "recording": ("Recording", "pad", "stack"),
-    "selection": ("Selection", "select"),
-    "simulation": ("simulate",),
-    "uncertainty": ("Estimate",),
+    "simulation.control": ("PD", "PID", "Cascade", "Encoder"),
+    "simulation.prediction": ("predict",),
+    "simulation.simulating": ("simulate",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
@@ -54,10 +65,9 @@ def __getattr__(name: str):
     if name in _HOME:
         value = getattr(import_module(f".{_HOME[name]}", __name__), name)
     elif name in _MODULES:
-        value = import_module(f".{name}", __name__)
+        value = import_module(f".{_MODULES[name]}", __name__)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # A function may bear its module's name (identify): the public name is the function.
     globals()[name] = value
     return value
 

@@ -2,18 +2,24 @@
 
 import dataclasses
 import json
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from inspect import isabstract
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from . import terms as laws
-from .recording import Recording
-from .terms.base import AbstractTerm, Directional, Sum
+from .data.printable import listed, short
+from .data.recording import Recording, described
+from .looks import html, text
+from .looks.text import Block, Table
+from .terms.base import AbstractTerm, Directional, Sum, summands
 from .units import SI, spell
 
 SCHEMA = "jaxfric.model/1"
@@ -24,7 +30,8 @@ class Model(eqx.Module):
 
     **Arguments:** `term`, any term or sum, its leaves the nonlinear parameters β; `alpha`, the
     affine parameters in the order of `term.affine`, shape `(p,)`; `units`, names of the force
-    and position unit.
+    and position unit. A parameter that is not known, of a direction that nothing moved in, is NaN;
+    so is the force wherever it would count, and only there.
     """
 
     term: AbstractTerm
@@ -41,17 +48,20 @@ class Model(eqx.Module):
         """
         names = [p.name for p in (*self.term.affine, *self.term.nonlinear)]
         if self.alpha.ndim > 1:
+            if isinstance(self.alpha, np.ndarray):  # of what was moved to numpy nothing is compiled
+                columns = [np.moveaxis(x, -1, 0) for x in (self.alpha, self.term.beta())]
+                return dict(zip(names, [*columns[0], *columns[1]], strict=True))
             rows = jax.vmap(lambda row: row.parameters)(self)
             return {name: rows[name] for name in names}
         return dict(zip(names, [*self.alpha, *self.term.beta()], strict=True))
 
     def force(self, recording: Recording) -> Float[Array, " N"]:
         """Actuator force without the acceleration terms, N, shape `(N,)`."""
-        return self.term.columns(recording) @ self.alpha + self.term.offset(recording)
+        return weighed(self.term.columns(recording), self.alpha) + self.term.offset(recording)
 
     def momentum(self, recording: Recording) -> Float[Array, " N"]:
         """What has to be differentiated in time to give the rest of the force, N·s, `(N,)`."""
-        return self.term.momentum(recording) @ self.alpha
+        return weighed(self.term.momentum(recording), self.alpha)
 
     def friction(self, velocity: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
         """The slip friction F_slip(v), N: every term that is a function of velocity alone.
@@ -65,7 +75,7 @@ class Model(eqx.Module):
         """The model without the terms that read a signal whose name begins with `prefix`."""
         parts = [
             (term, alpha)
-            for term, alpha in zip(_summands(self.term), self._alphas(), strict=True)
+            for term, alpha in zip(summands(self.term), self._alphas(), strict=True)
             if not any(name.startswith(prefix) for name in term.coordinates)
         ]
         terms, alphas = zip(*parts, strict=True)
@@ -86,7 +96,7 @@ class Model(eqx.Module):
         """The model as plain data for JSON: structure, parameters with units."""
         dimensions = {p.name: p.dimension for p in (*self.term.affine, *self.term.nonlinear)}
         parameters = {
-            name: {"value": float(value), "unit": spell(dimensions[name], dict(self.units))}
+            name: {"value": _known(value), "unit": spell(dimensions[name], dict(self.units))}
             for name, value in self.parameters.items()
         }
         structure = {"term": _term_to_dict(self.term), "parameters": parameters}
@@ -97,28 +107,43 @@ class Model(eqx.Module):
         """The model that [`to_dict`][] wrote; raises `ValueError` where the document is not one."""
         schema = document.get("schema") if isinstance(document, Mapping) else None
         if schema != SCHEMA:
-            raise ValueError(f"Not a model document: schema is {schema!r}, not {SCHEMA!r}.")
+            shown = short(repr(schema))
+            raise ValueError(f"Not a model document: schema is {shown}, not {SCHEMA!r}.")
         try:
             term = _term_from_dict(document["term"])
             entries = document["parameters"].items()
             values = {name: _number(name, entry["value"]) for name, entry in entries}
+        except RecursionError as error:
+            raise ValueError("The model document is nested deeper than any model.") from error
         except (KeyError, TypeError, AttributeError) as error:
+            shown = short(repr(error))
             raise ValueError(
-                f"The model document is damaged: {error!r} is missing or misplaced."
+                f"The model document is damaged: {shown} is missing or misplaced."
             ) from error
-        units = document.get("units", {})
-        if not isinstance(units, Mapping) or not all(isinstance(u, str) for u in units.values()):
-            raise ValueError(
-                f"The model document's units must be names by quantity, not {units!r}."
-            )
-        return from_parameters(term, values, units)
+        return from_parameters(term, values, _units(document.get("units", {})))
+
+    def __repr__(self) -> str:
+        return text.shown(self, _blocks)
+
+    def _repr_html_(self) -> str:
+        return html.shown(self, _blocks)
 
     def _alphas(self):
         start, parts = 0, []
-        for term in _summands(self.term):
+        for term in summands(self.term):
             parts.append(self.alpha[start : start + len(term.affine)])
             start += len(term.affine)
         return parts
+
+
+def weighed(
+    columns: Float[Array, "N p"], alpha: Float[Array, " p"], unknown: float | Array = float("nan")
+) -> Float[Array, " N"]:
+    """The sum of columns, each times its parameter; `unknown` where one that is NaN would count."""
+    lacking = jnp.isnan(alpha)
+    total = jnp.where(lacking[None], 0.0, columns) @ jnp.where(lacking, 0.0, alpha)
+    counts = jnp.any((columns != 0) & lacking[None], axis=-1)
+    return jnp.where(counts, jnp.asarray(unknown, total.dtype), total)
 
 
 @eqx.filter_jit
@@ -126,9 +151,9 @@ def _slip_friction(model: Model, velocity: Float[Array, "*shape"]) -> Float[Arra
     flat = jnp.ravel(velocity)
     motion = Recording(time=jnp.zeros_like(flat), force=jnp.zeros_like(flat), velocity=flat)
     total = jnp.zeros_like(flat)
-    for term, alpha in zip(_summands(model.term), model._alphas(), strict=True):
+    for term, alpha in zip(summands(model.term), model._alphas(), strict=True):
         if term.coordinates <= {"velocity"}:
-            total = total + term.columns(motion) @ alpha + term.offset(motion)
+            total = total + weighed(term.columns(motion), alpha) + term.offset(motion)
     return jnp.reshape(total, velocity.shape)
 
 
@@ -142,9 +167,7 @@ def from_parameters(
     names = [p.name for p in (*term.affine, *term.nonlinear)]
     missing = [name for name in names if name not in values]
     if missing:
-        raise ValueError(
-            f"Missing parameter {', '.join(missing)}; the model needs {', '.join(names)}."
-        )
+        raise ValueError(f"Missing parameter {listed(missing)}; the model needs {listed(names)}.")
     empty = Model(term, jnp.zeros(len(term.affine)), tuple((units or {}).items()))
     return empty.with_parameters(values)
 
@@ -181,7 +204,7 @@ def _with_bump(bump: AbstractTerm) -> Sum:
 def symmetric(model: Sum) -> Sum:
     """A model whose two directions share their parameters, with a constant offset beside them."""
     tied = [t.positive if isinstance(t, Directional) else t for t in model.terms]
-    return Sum(tuple(leaf for t in tied for leaf in _summands(t))) + laws.Offset()
+    return Sum(tuple(leaf for t in tied for leaf in summands(t))) + laws.Offset()
 
 
 NAMED: dict[str, Callable[[], Sum]] = {
@@ -191,6 +214,58 @@ NAMED: dict[str, Callable[[], Sum]] = {
     "exponential": exponential,
     "generalised": generalised,
 }
+
+
+def name_of(term: AbstractTerm) -> str:
+    """The name of a model, or its terms where it has none."""
+    structure = jax.tree.structure(term)
+    known = (name for name, other in _structures().items() if other == structure)
+    return next(known, None) or _spelled(term)
+
+
+@cache
+def _structures() -> dict[str, Any]:
+    return {name: jax.tree.structure(named(name)) for name in names()}
+
+
+def _spelled(term: AbstractTerm) -> str:
+    if isinstance(term, Sum):
+        return " + ".join(map(_spelled, term.terms))
+    if isinstance(term, Directional):
+        sides = dict.fromkeys(map(_spelled, (term.positive, term.negative)))
+        return f"Directional({', '.join(sides)})"
+    return type(term).__name__
+
+
+def _blocks(model: Model) -> Iterator[Block]:
+    """What to say of a model of arrays of numpy: each parameter with its unit; medians of rows."""
+    units, term = dict(model.units), model.term
+    several = model.alpha.ndim > 1
+    count = f", medians of {model.alpha[..., 0].size} rows" * several
+    yield [f"model {name_of(term)}{count}"]
+    dimensions = {p.name: p.dimension for p in (*term.affine, *term.nonlinear)}
+    table = [
+        [f"  {name}", "=", f"{np.median(value):.5g}", spell(dimensions[name], units)]
+        for name, value in model.parameters.items()
+    ]
+    yield Table(table, (2,))
+
+
+def require(model: object, verb: str) -> None:
+    """Raise `ValueError`, with the remedy, where an argument is not one model with its values."""
+    if isinstance(model, Model):
+        if jnp.ndim(model.alpha) != 1:
+            raise ValueError(
+                f"{verb} takes one model, not a batch: give a row, "
+                "jax.tree.map(lambda x: x[i], model), or use jax.vmap."
+            )
+        return
+    hint = "Load a saved one: jaxfric.models.load(text)."
+    if isinstance(model, AbstractTerm):
+        hint = "Its parameters need values: jaxfric.models.from_parameters(term, values)."
+    elif isinstance(getattr(model, "model", None), Model):
+        hint = "Give its .model."
+    raise ValueError(f"{verb} needs a Model, not {described(model)}. {hint}")
 
 
 def names() -> tuple[str, ...]:
@@ -213,15 +288,11 @@ def load(text: str) -> Model:
     """
     try:
         document = json.loads(text)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:  # also a number of thousands of digits
         raise ValueError(f"Not a model document: this is no JSON: {error}.") from error
     if isinstance(document, dict) and document.get("schema") != SCHEMA and "model" in document:
         document = document["model"]
     return Model.from_dict(document)
-
-
-def _summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
-    return term.terms if isinstance(term, Sum) else (term,)
 
 
 def _term_to_dict(term: AbstractTerm) -> dict[str, Any]:
@@ -240,33 +311,101 @@ def _plain(value: Any) -> Any:
         return _term_to_dict(value)
     if isinstance(value, tuple | list):
         return [_plain(item) for item in value]
-    return value.tolist() if isinstance(value, jax.Array) else value
+    return value.tolist() if isinstance(value, jax.Array | np.ndarray) else value
+
+
+def _known(value: Any) -> float | None:
+    """A number for JSON; `None` for one that is not known."""
+    return None if np.isnan(value) else float(value)
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value of a JSON document is a number that a float holds; NaN is one not known."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return not math.isinf(float(value))
+    except OverflowError:
+        return False
 
 
 def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"Parameter {name} of the model document must be a number, not {value!r}.")
-    return float(value)
+    """A parameter's number; NaN where it is not known."""
+    if value is None:
+        return float("nan")
+    if _is_number(value):
+        return float(value)
+    shown = short(repr(value))
+    raise ValueError(f"Parameter {name} of the model document must be a number, not {shown}.")
+
+
+def _units(units: Any) -> dict[str, str]:
+    if not isinstance(units, Mapping) or not all(
+        quantity in SI and isinstance(unit, str) and unit.isprintable() and short(unit) == unit
+        for quantity, unit in units.items()
+    ):
+        raise ValueError(
+            "The model document's units must be names of the force and the position unit, not "
+            f"{short(repr(units))}."
+        )
+    return dict(units)
 
 
 def _term_from_dict(document: Mapping[str, Any]) -> AbstractTerm:
     kind = document["type"]
-    found = getattr(laws, kind, None)
+    found = getattr(laws, kind, None) if isinstance(kind, str) else None
     if not (isinstance(found, type) and issubclass(found, AbstractTerm)) or isabstract(found):
         raise ValueError(
-            f"The model document names a term {kind!r} that jaxfric.terms does not have."
+            f"The model document names a term {short(repr(kind))} that jaxfric.terms does not have."
         )
     fields = {name: _revived(value) for name, value in document.items() if name != "type"}
     if found is Directional:
         return Directional(_term(fields["positive"]), _term(fields["negative"]))
     if found is Sum:
         return Sum(tuple(_term(part) for part in fields["terms"]))
+    for field in dataclasses.fields(found):
+        if field.name in fields:
+            _check_field(f"{kind}.{field.name}", fields[field.name], field.type)
     return found(**fields)
+
+
+# Nobody identifies so many waves or poles: a larger number is no number of them.
+MOST_COUNTED = 100
+
+
+def _check_field(name: str, value: Any, kind: Any) -> None:
+    """Raise `ValueError` where the field of a term is of another kind than its class says."""
+    if kind is int:
+        right = isinstance(value, int) and _is_number(value) and 0 <= value <= MOST_COUNTED
+    elif kind is float:
+        right = _is_number(value) and not math.isnan(value)
+    elif kind is str:
+        right = isinstance(value, str) and value.isidentifier()
+    elif kind == tuple[float, ...]:
+        for part in value if isinstance(value, tuple) else [None]:
+            _check_field(name, part, float)
+        return
+    elif isinstance(kind, type) and issubclass(kind, AbstractTerm):
+        right = isinstance(value, kind)
+    else:
+        right = not isinstance(value, AbstractTerm)
+    if not right:
+        raise ValueError(
+            f"{name} of the model document is {short(repr(value))}: {_wanted(kind)} belongs there."
+        )
+
+
+def _wanted(kind: Any) -> str:
+    if kind is int:
+        return f"a whole number up to {MOST_COUNTED}"
+    term = isinstance(kind, type) and issubclass(kind, AbstractTerm)
+    return {float: "a finite number", str: "a name"}.get(kind, "a term" if term else "no term")
 
 
 def _term(value: Any) -> AbstractTerm:
     if not isinstance(value, AbstractTerm):
-        raise TypeError(f"a term where {value!r} stands")
+        shown = short(repr(value))
+        raise ValueError(f"The model document is damaged: {shown} stands where a term belongs.")
     return value
 
 

@@ -63,7 +63,7 @@ def kept(*steps: Callable, optimised: int = 0) -> Callable:
 
     Of several steps each takes what the one before returned, then the arguments; while the
     program of one compiles, the next is traced, and compiles beside it. `optimised`: how much XLA
-    optimises programs of few samples that are kept; if at all, those that are not kept too.
+    optimises programs of few samples: they take longer to compile than to run a hundred times.
 
     Only calls with concrete arrays on a single CPU device are kept; any other is as without.
     """
@@ -80,7 +80,7 @@ def kept(*steps: Callable, optimised: int = 0) -> Callable:
             return _in_turn(plain, arguments)
         if _store is not None:
             return _in_turn(_programs(steps, arguments, optimised, _store), arguments)
-        return _in_turn(quick() if optimised else plain, arguments)
+        return _in_turn(quick() if _few(arguments) else plain, arguments)
 
     return call
 
@@ -104,6 +104,10 @@ def quick_options(optimised: int = 0) -> dict[str, Any]:
         return False
 
     return {name: value for name, value in options.items() if known(name)}
+
+
+def _few(arguments) -> bool:
+    return max((leaf.size for leaf in _arrays(arguments)), default=0) <= QUICK_SAMPLES
 
 
 def _simple(arguments) -> bool:
@@ -140,8 +144,7 @@ class _Program:
         self.known = found is not None
         if found is None:
             lowered, self.template = _lower(function, arguments)
-            size = max((leaf.size for leaf in _arrays(arguments)), default=0)
-            options = quick_options(optimised) if size <= QUICK_SAMPLES else None
+            options = quick_options(optimised) if _few(arguments) else None
             self.binary = pool.submit(lowered.compile, options)
         else:
             binary, self.template = found

@@ -4,6 +4,8 @@ Nothing here computes with units. Numbers stay in the recording's own units thro
 module only writes the unit beside the number.
 """
 
+import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 
@@ -28,6 +30,53 @@ INERTIA = Dimension(force=1, position=-1, time=2)
 
 SI = {"force": "N", "position": "m"}
 _ROTARY_FORCES = ("N·m", "N*m", "Nm")
+
+
+# What one of a unit is in the first unit of its kind.
+_KINDS: tuple[Mapping[str, float], ...] = (
+    {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
+    {"rad": 1, "mrad": 1e-3, "deg": math.pi / 180, "rev": 2 * math.pi},
+    {"N": 1, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216153, "kgf": 9.80665},
+    {
+        "N·m": 1, "mN·m": 1e-3, "µN·m": 1e-6, "kN·m": 1e3, "MN·m": 1e6, "N·cm": 1e-2,
+        "lbf·ft": 1.3558179483, "lbf·in": 0.112984829,
+    },
+    {"A": 1, "mA": 1e-3},
+    {"V": 1, "mV": 1e-3},
+)  # fmt: skip
+
+
+def factor(unit: str, other: str) -> float | None:
+    """What one of `unit` is in the `other`, or `None` where they are not of one kind."""
+    kind = next((kind for kind in _KINDS if unit in kind and other in kind), None)
+    return None if kind is None else kind[unit] / kind[other]
+
+
+def check_same(
+    ours: Mapping[str, str], theirs: Mapping[str, str], name: str, other: str, option: str = "scale"
+) -> None:
+    """Refuse a comparison of numbers in different units.
+
+    Newton and metre are also what is taken where nothing is stated: beside a unit of another kind
+    (an angle, a current) they give way.
+
+    **Arguments:** the names of the force and the position unit of both sides; `name` and `other`,
+    what these are, for the message; `option`, which factor of the other to give.
+
+    **Raises:** `ValueError` with the factor.
+    """
+    for quantity, unit in theirs.items():
+        wanted = ours[quantity]
+        times = factor(unit, wanted)
+        if unit == wanted or (times is None and SI[quantity] in (unit, wanted)):
+            continue
+        number = "FACTOR" if times is None else f"{times:.12g}"
+        raise ValueError(
+            f"{other}: {quantity} is in {unit}, but in {wanted} in {name}, and both are to be "
+            f"compared. Convert: --{option} {quantity}={number} (in Python, jf.read(..., "
+            f"scale={{{quantity!r}: {number}}}, units={{{quantity!r}: {wanted!r}}})); or, if the "
+            f"numbers are alike, name one unit for both: --units {quantity}={wanted}."
+        )
 
 
 def is_rotary(units: dict[str, str]) -> bool:

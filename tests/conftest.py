@@ -17,6 +17,21 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
+# Most of the fast tests' time is compiling: programs that run once need no optimisation. The slow
+# tests and what they start compile as users do.
+QUICK = (
+    "--xla_cpu_use_fusion_emitters=false",
+    "--xla_backend_optimization_level=0",
+    "--xla_llvm_disable_expensive_passes=true",
+)
+
+
+def pytest_configure(config):
+    """Set XLA's options before its first program; processes that tests start inherit them."""
+    if config.getoption("-m") != "slow":
+        os.environ["XLA_FLAGS"] = " ".join([*os.environ.get("XLA_FLAGS", "").split(), *QUICK])
+
+
 # Compiling takes longer than any deadline, and a test that fails must fail again when it is rerun.
 settings.register_profile("jaxfric", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("jaxfric")

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from jaxfric import glossary
 from jaxfric.cli import main
-from jaxfric.effects import EFFECTS
+from jaxfric.terms import glossary
+from jaxfric.terms.effects import EFFECTS
 
 
 @pytest.fixture(autouse=True)

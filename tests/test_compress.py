@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import compress, reduced
+from jaxfric.identification import compress, reduced
 from jaxfric.terms.friction import Exponential, Gaussian, Generalised, Lorentzian
 
 MOMENTS = jax.jit(reduced.moments)

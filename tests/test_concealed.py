@@ -6,13 +6,14 @@ import jax
 import numpy as np
 import pytest
 
-from jaxfric import concealed, models
-from jaxfric.catalogue import CATALOGUE
-from jaxfric.concealed import drawing, tuning
-from jaxfric.concealed.kinds import KINDS
-from jaxfric.concealed.nominal import friction, rms
-from jaxfric.concealed.tuning import in_loop
-from jaxfric.proof import planning
+from jaxfric import models
+from jaxfric.terms.catalogue import CATALOGUE
+from jaxfric.validation import concealed
+from jaxfric.validation.concealed import drawing, tuning
+from jaxfric.validation.concealed.kinds import KINDS
+from jaxfric.validation.concealed.nominal import friction, rms
+from jaxfric.validation.concealed.tuning import in_loop
+from jaxfric.validation.proof import planning
 
 SIZE = 0.12
 # Where a lag makes the force differ most, at a reversal, its size does not count (slip alone does).

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identified import result_names
+from jaxfric.identification.identified import result_names
 from tests.machines import fleet
 
 

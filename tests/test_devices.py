@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric import devices
-from jaxfric.identified import result_names
+from jaxfric.identification import devices
+from jaxfric.identification.identified import result_names
 
 ROOT = Path(__file__).parents[1]
 
@@ -116,7 +116,7 @@ def test_a_velocity_is_smoothed_with_the_width_that_suits_its_row():
     place = np.cos(2 * np.pi * time)
     noise = 0.02 * np.random.default_rng(0).normal(size=time.size)
     pair = [jf.Recording(time, place, position=place + x) for x in (0.0, noise)]
-    from jaxfric.question import ask
+    from jaxfric.identification.question import ask
 
     both = ask("coulomb-viscous", jf.stack(pair), jf.ClosedWindows(), width=16).recording.velocity
     for row, single in zip(both, pair, strict=True):

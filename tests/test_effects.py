@@ -9,13 +9,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import catalogue, effects, models, signals, terms as T
-from jaxfric.control import PD, Encoder
-from jaxfric.identification import identify
-from jaxfric.projections import WeakForm
-from jaxfric.recording import Recording, stack
-from jaxfric.simulation import simulate
-from jaxfric.terms import transmission
+from jaxfric import models, signals, terms as T
+from jaxfric.data.recording import Recording, stack
+from jaxfric.identification.identifying import identify
+from jaxfric.identification.projections import WeakForm
+from jaxfric.simulation.control import PD, Encoder
+from jaxfric.simulation.simulating import simulate
+from jaxfric.terms import catalogue, effects, transmission
 from jaxfric.terms.base import bounds
 from jaxfric.terms.sample import Scales
 from jaxfric.units import Dimension, spell

@@ -15,9 +15,9 @@ import pytest
 
 from jaxfric import models, terms
 from jaxfric.cli import main
+from jaxfric.data.recording import Recording
 from jaxfric.export import TARGETS, export
 from jaxfric.export.laws import COLUMNS, FACTORS
-from jaxfric.recording import Recording
 from jaxfric.terms import Directional
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -493,3 +493,13 @@ def test_bad_input_writes_nothing(tmp_path, monkeypatch, capsys):
     printed = capsys.readouterr()
     assert printed.err.count("\n") == 1 and "model.json" in printed.err
     assert "presliding" in printed.err and not out.exists()
+
+
+def test_friction_that_drives_is_remarked_on():
+    parameters = {"inertia": -0.7, "coulomb+": -20.0, "viscous+": 3.0, "coulomb-": -18.0}
+    odd = models.from_parameters(models.coulomb_viscous(), parameters | {"viscous-": 2.0})
+    for target in ("c", "table"):
+        remarks = " ".join(export(odd, target).remarks)
+        assert "inertia is negative, -0.7" in remarks and "drives the axis" in remarks
+    load = {"inertia": 2.0, "coulomb+": 50.0, "viscous+": 3.0, "coulomb-": -10.0, "viscous-": 3.0}
+    assert not export(models.from_parameters(models.coulomb_viscous(), load), "c").remarks

@@ -13,10 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jaxfric import cli, fleet, io
+from jaxfric import cli, fleet
 from jaxfric.cli import main
 from jaxfric.cli.fleet import span
 from jaxfric.cli.options import process
+from jaxfric.data import io
 from jaxfric.fleet import batches, comparing, files as listing, journal, tables
 
 ROOT = Path(__file__).parents[1]
@@ -133,11 +134,11 @@ def test_an_interrupted_run_goes_on_without_losing_or_repeating_rows(logs, tmp_p
     out, solved = tmp_path / "fits.csv", []
     real = batches.devices.solve
 
-    def solve(question, over):
+    def solve(question, faults, over):
         if len(solved) == 2:
             raise Died
         solved.append(question.recording.time.shape)
-        return real(question, over)
+        return real(question, faults, over)
 
     monkeypatch.setattr(batches.devices, "solve", solve)
     with pytest.raises(Died):
@@ -229,7 +230,7 @@ def a_file(name="a.csv", axis="", size=1, changed=1, group=""):
 def test_rows_of_other_options_are_not_taken_over(tmp_path):
     out = tmp_path / "fits.csv"
     with journal.Journal(out, {"model": "gaussian"}) as kept:
-        kept.add([(a_file(), {"result": "successful"})])
+        kept.add([(a_file(), {"result": "successful", "parameters": {}})])
     with pytest.raises(ValueError, match="model gaussian, not lorentzian.*--restart"):
         journal.Journal(out, {"model": "lorentzian"}).__enter__()
     journal.forget(out)
@@ -263,7 +264,7 @@ def test_beginning_anew_each_process_removes_its_own_rows(tmp_path):
 
 def test_rows_of_changed_files_are_made_anew(tmp_path):
     with journal.Journal(tmp_path / "fits.csv", {}) as kept:
-        kept.add([(a_file(), {"result": "successful"})])
+        kept.add([(a_file(), {"result": "successful", "parameters": {}})])
         assert set(kept.rows([a_file()])) == {"a.csv"}
         assert not kept.rows([a_file(size=2)])
         assert not kept.rows([a_file(changed=2)])

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification import _solve
+from jaxfric.identification.identifying import _solve
+from jaxfric.identification.projections import Rows
+from jaxfric.identification.search import search
 from jaxfric.programs import quick_options
-from jaxfric.projections import Rows
-from jaxfric.search import search
 from jaxfric.terms import Coulomb, Directional, Gaussian, Lorentzian, Sum, Viscous
 
 # Many programs that run once: compiled quickly.

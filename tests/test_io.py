@@ -10,8 +10,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
-from jaxfric import io
-from jaxfric.columns import assign, describe
+from jaxfric.data import io
+from jaxfric.data.columns import assign, describe
 
 DATA = Path(os.environ.get("JAXFRIC_DATA", Path(__file__).parents[2] / "shared" / "data"))
 needs_data = pytest.mark.skipif(
@@ -118,7 +118,7 @@ def test_arrow_and_plain_csv_agree(tmp_path, monkeypatch):
     columns = log(50) | {"mode": ["a", "b"] * 25, "temp": [20.0] * 49 + [""]}
     path = save(tmp_path / "log.csv", columns)
     plain = io.read(path)
-    monkeypatch.setattr("jaxfric.delimited._SMALL_CSV", 0)
+    monkeypatch.setattr("jaxfric.data.delimited._SMALL_CSV", 0)
     arrow = io.read(path)
     for name in ("time", "position", "force"):
         np.testing.assert_array_equal(getattr(arrow, name), getattr(plain, name))
@@ -276,9 +276,9 @@ def test_velocity_must_be_position_per_second(tmp_path):
 
 
 def test_a_clean_log_is_left_alone(tmp_path):
-    columns = log()
     jitter = np.random.default_rng(1).uniform(0.0, 0.9e-3, 200)
-    columns["time"] = columns["time"] + jitter
+    t = log()["time"] + jitter  # and that is when the samples were taken
+    columns = {"time": t, "position": np.sin(7 * t), "force": np.cos(7 * t)}
     recording, notes = io.read_with_notes(save(tmp_path / "log.csv", columns))
     assert notes == [] and recording.num_segments == 1
     np.testing.assert_array_equal(recording.time, columns["time"])

@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,13 +13,11 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 
 # Each room imports only from rooms before it. A new file gets its place here, or the test says so.
 ORDER = """
-    units programs recording terms signals models catalogue effects
-    columns delimited cleaning tables io
-    small refine projections reduced compress sides uncertainty search
-    weighing identified question identification devices selection online
-    control plant prediction simulation scenario
-    explanation concealed documents glossary tabulate fleet proof report export cli __main__
+    units programs looks data terms signals models checks identification simulation simulators
+    explanation export fleet report validation cli __main__
 """.split()
+
+GUIDE = Path(__file__).parents[1] / "CONTRIBUTING.md"
 
 FILES = sorted(PACKAGE.rglob("*.py"))
 
@@ -69,6 +68,18 @@ def test_imports_go_down_the_layout(path):
     assert not wrong, f"{here} imports {', '.join(wrong)}, which stand after it in the layout"
 
 
+def test_the_guide_says_where_everything_is():
+    """Its table lists every package, from the bottom up, and nothing else."""
+    listed = re.findall(r"^\| `jaxfric/(\w+)(?:/|\.py)` \|", GUIDE.read_text("utf-8"), re.MULTILINE)
+    there = {path.stem for path in PACKAGE.iterdir() if not path.name.startswith("__")}
+    assert set(listed) == there
+    assert listed == [name for name in ORDER if name in there]
+
+
+def test_few_files_lie_at_the_top():
+    assert len([path for path in PACKAGE.glob("*.py") if path.name[0] != "_"]) <= 3
+
+
 def test_no_module_imports_itself_by_a_detour():
     graph = {module(path): set(imported(path)) - {module(path)} for path in FILES if module(path)}
     # A package re-exports its files and its files may name the package: no detour of interest.
@@ -105,7 +116,8 @@ def test_public_names_stay_what_they_are_whatever_was_imported_before():
         "import importlib, pkgutil, types, jaxfric\n"
         "for m in pkgutil.walk_packages(jaxfric.__path__, 'jaxfric.'):\n"
         "    if m.name.split('.')[1] != '__main__': importlib.import_module(m.name)\n"
-        "modules = ('devices', 'export', 'fleet', 'models', 'scenario', 'signals', 'terms')\n"
+        "modules = ('devices', 'export', 'fleet', 'models', 'scenario', 'signals',\n"
+        "           'simulators', 'terms')\n"
         "hidden = [n for n in jaxfric.__all__ if n not in modules\n"
         "          and isinstance(getattr(jaxfric, n), types.ModuleType)]\n"
         "assert not hidden, hidden\n"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from jaxfric import models, terms
-from jaxfric.recording import Recording
+from jaxfric.data.recording import Recording
 
 ALL = models.names()
 
@@ -197,7 +197,7 @@ def damaged(change):
         (damaged(lambda d: d["parameters"].pop("inertia")), "Missing parameter inertia"),
         (damaged(lambda d: d["parameters"].update(x={"value": 1.0})), "No parameter x"),
         (damaged(lambda d: d["parameters"]["inertia"].update(value="heavy")), "inertia"),
-        (damaged(lambda d: d["parameters"]["inertia"].update(value=None)), "inertia"),
+        (damaged(lambda d: d["parameters"]["inertia"].update(value=[])), "inertia"),
         (damaged(lambda d: d["parameters"].update(inertia=3.0)), "damaged"),
         (damaged(lambda d: d["term"].update(type="Nonsense")), "Nonsense"),
         (damaged(lambda d: d["term"].update(type="AbstractLaw")), "AbstractLaw"),

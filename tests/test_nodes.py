@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric import compress, search as searching
+from jaxfric.identification import compress, search as searching
+from jaxfric.identification.projections import Rows
 from jaxfric.programs import quick_options
-from jaxfric.projections import Rows
 from jaxfric.terms import Coulomb, Directional, Gaussian, Sum, Viscous
 
 SIZE = 2000

@@ -16,9 +16,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import models, scenario
-from jaxfric.control import Encoder
-from jaxfric.identification import identify
+from jaxfric import models
+from jaxfric.identification.identifying import identify
+from jaxfric.simulation import scenario
+from jaxfric.simulation.control import Encoder
 
 HELPER = pathlib.Path(__file__).parents[1] / "benchmarks" / "problem_p.py"
 spec = importlib.util.spec_from_file_location("problem_p", HELPER)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric import proof
-from jaxfric.proof import comparing, planting, trials
-from jaxfric.uncertainty import Estimate
+from jaxfric.identification.uncertainty import Estimate
+from jaxfric.validation import proof
+from jaxfric.validation.proof import comparing, planting, trials
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 

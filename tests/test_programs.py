@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxfric as jf
 from jaxfric import programs
 
 
@@ -155,3 +156,29 @@ def test_what_is_optimised_a_little_is_so_without_a_folder_too(tmp_path):
     np.testing.assert_array_equal(inside(Pair(jnp.arange(3.0), "a")), expected)
     with programs.kept_in(tmp_path):
         np.testing.assert_array_equal(little(3, ARGUMENTS[0])[0], expected)
+
+
+def test_files_of_other_names_units_and_lengths_share_their_programs():
+    """What is compiled for the first of ten serves the nine others, of the same padded length."""
+    compiled = []
+
+    def listen(event, duration, **facts):
+        if "backend_compile" in event:
+            compiled.append(event)
+
+    logs = []
+    for i in range(10):
+        time = np.arange(1100 + 17 * i) / 500
+        speed = 0.1 * np.sin(2 * np.pi * time) + 0.05 * np.sin(7 * time + i)
+        noise = 0.1 * np.random.default_rng(i).normal(size=time.size)
+        units = {"force": ("N", "kN", "A")[i % 3], "position": ("m", "mm")[i % 2]}
+        force = 5 * np.sign(speed) + 3 * speed + np.gradient(speed, time) + noise
+        logs.append(jf.Recording(time, force, None, speed, units=units, source=f"log{i}.csv"))
+    jax.monitoring.register_event_duration_secs_listener(listen)
+    counts, found = [], []
+    for log in logs:
+        before = len(compiled)
+        found.append(jf.identify("coulomb-viscous", log))
+        counts.append(len(compiled) - before)
+    assert counts[1:] == [0] * 9, counts
+    assert found[1].parameters["coulomb+"].unit == "kN" and found[2].model.units[0][1] == "A"

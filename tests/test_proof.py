@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jaxfric import proof
 from jaxfric.cli import main
-from jaxfric.concealed import NAMES, OUTSIDE
-from jaxfric.effects import effect
-from jaxfric.proof import counting, running, scoring, trials, workers
+from jaxfric.terms.effects import effect
+from jaxfric.validation import proof
+from jaxfric.validation.concealed import NAMES, OUTSIDE
+from jaxfric.validation.proof import counting, running, scoring, trials, workers
 
 RANGE = (0.02, 0.3)
 

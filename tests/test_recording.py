@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric.recording import Recording, pad, stack
+from jaxfric.data.recording import Recording, pad, stack
 
 
 def log(n=5, **signals):

@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxfric as jf
-from jaxfric import reduced, refine
-from jaxfric.identified import result_names
+from jaxfric.identification import reduced, refine
+from jaxfric.identification.identified import result_names
+from jaxfric.identification.projections import Rows
+from jaxfric.identification.search import search
 from jaxfric.programs import quick_options
-from jaxfric.projections import Rows
-from jaxfric.search import search
 
 
 def exact_cost(columns, target, weight):

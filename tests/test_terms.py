@@ -13,9 +13,9 @@ from hypothesis import given, strategies as st
 from jaxtyping import Array, Float
 
 from jaxfric import models, terms
-from jaxfric.identification import identify
-from jaxfric.recording import Recording, stack
-from jaxfric.terms import (
+from jaxfric.data.recording import Recording, stack
+from jaxfric.identification.identifying import identify
+from jaxfric.terms import (  # fmt: skip
     Coulomb,
     Directional,
     Exponential,
@@ -26,7 +26,7 @@ from jaxfric.terms import (
     Offset,
     Sum,
     Viscous,
-)  # fmt: skip
+)
 from jaxfric.terms.base import bounds, summands
 from jaxfric.terms.sample import Scales
 from jaxfric.units import FORCE, VELOCITY
@@ -40,6 +40,7 @@ CASES = {
     "generalised": Generalised(0.3, 1.4),
     "inertia": Inertia(),
     "offset": Offset(),
+    "gravity": terms.Gravity(),
     "sum": Sum((Coulomb(), Gaussian(0.3), Generalised(0.2, 0.7))),
     "directional": Directional(Coulomb() + Gaussian(0.3), Coulomb() + Lorentzian(0.2)),
     "nested": Inertia() + Directional(Coulomb() + Viscous() + Generalised(0.3, 1.4)) + Offset(),

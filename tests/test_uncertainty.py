@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric import uncertainty
-from jaxfric.identified import result_names
+from jaxfric.identification import uncertainty
+from jaxfric.identification.identified import result_names
 
 
 def trajectory(rng, seconds, rate):

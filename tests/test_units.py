@@ -1,8 +1,13 @@
 """Units written beside numbers."""
 
+import re
+
 import pytest
 
 from jaxfric import units
+from jaxfric.data import io
+from jaxfric.data.columns import describe, stated_unit, unknown_units
+from jaxfric.data.recording import Recording, check_same_units
 from jaxfric.units import Dimension, is_rotary, spell
 
 ROTARY = {"force": "N·m", "position": "rad"}
@@ -52,3 +57,134 @@ def test_mass_is_kilogram_only_where_the_names_allow_it():
 )
 def test_rotary_axes_are_told_by_their_units(names, rotary):
     assert is_rotary(names) is rotary
+
+
+@pytest.mark.parametrize(
+    ("name", "role", "unit"),
+    [
+        ("speed [U/min]", "velocity", "rpm"),
+        ("speed [Umdr/min]", "velocity", "rpm"),
+        ("v [r/min]", "velocity", "rpm"),
+        ("omega [min^-1]", "velocity", "rpm"),
+        ("speed_u_min", "velocity", "rpm"),
+        ("velocity [Grad/s]", "velocity", "deg/s"),
+        ("velocity [rad·s^-1]", "velocity", "rad/s"),
+        ("velocity [mm/min]", "velocity", "mm/min"),
+        ("time [milliseconds]", "time", "ms"),
+        ("t [msec]", "time", "ms"),
+        ("t [millis]", "time", "ms"),
+        ("time [Mikrosekunden]", "time", "µs"),
+        ("time_hours", "time", "h"),
+        ("position [Umdrehungen]", "position", "rev"),
+        ("position [inch]", "position", "in"),
+        ("position_in", None, None),
+        ("torque [Newtonmeter]", "force", "N·m"),
+        ("torque [lbf·in]", "force", "lbf·in"),
+        ("current [Arms]", "force", "A"),
+        ("speed [1/s]", "velocity", None),
+    ],
+)
+def test_units_are_read_in_the_spellings_of_loggers(name, role, unit):
+    assert describe(name) == (role, unit)
+
+
+def test_a_column_given_by_the_user_states_its_unit_as_well():
+    assert stated_unit("Drehzahl [U/min]", "velocity") == "rpm"
+    assert stated_unit("drehzahl_rpm", "velocity") == "rpm"
+    assert stated_unit("axis_a", "force") is None
+
+
+@pytest.mark.parametrize(
+    ("column", "text"),
+    [
+        ("position [furlong]", r"unit \[furlong\] of column 'position \[furlong\]' is not known"),
+        ("position [N]", r"\[N\] .* is no unit of position; .* --scale position=FACTOR"),
+        ("velocity [1/s]", r"\[1/s\] .* taken as the unit of the position per second"),
+    ],
+)
+def test_a_unit_that_is_not_known_is_told(column, text):
+    role = column.split()[0]
+    (sentence,) = unknown_units({role: column}, {})
+    assert re.search(text, sentence)
+    assert unknown_units({role: column}, {role: 2.0}) == []
+
+
+@pytest.mark.parametrize("column", ["q[0]", "torque (filtered)", "position [actual]", "x (axis 3)"])
+def test_a_bracket_that_is_no_unit_passes(column):
+    role = describe(column)[0]
+    assert unknown_units({role: column}, {}) == []
+
+
+@pytest.mark.parametrize(
+    ("header", "remedy"),
+    [
+        ("t [msec],x,f", "--scale time=0.001"),
+        ("time_h,x,f", "--scale time=3600"),
+        ("t,speed [U/min],f", "--scale velocity=0.1047"),
+        ("t,speed [mm/min],f", "--scale velocity=0.016666"),
+    ],
+)
+def test_units_that_are_not_per_second_are_refused(tmp_path, header, remedy):
+    rows = "".join(f"{i / 100},{i % 7},{i % 3}\n" for i in range(40))
+    (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
+    with pytest.raises(ValueError, match=remedy):
+        io.read(tmp_path / "log.csv")
+
+
+MIXED = {
+    "point beside comma": ("0.01\t12,345\t1", "row 7: '12,345' beside '0.00' in row 2"),
+    "both in a cell": ("0.01\t1,234.5\t1", "row 7: '1,234.5' beside '0.00' in row 2"),
+    "German thousands": ("0\t1.234,5\t1", "row 7: '1.234,5' beside"),
+    "two groups": ("0.01\t1,234,567\t1", "row 7: '1,234,567'"),
+}
+
+
+@pytest.mark.parametrize("kind", MIXED)
+@pytest.mark.parametrize("delimiter", ["\t", ";", " "])
+def test_a_comma_beside_a_point_is_not_guessed(tmp_path, kind, delimiter):
+    row, message = MIXED[kind]
+    rows = [f"{i / 100:.2f}\t{i}\t{i % 3}" for i in range(40)]
+    rows[5] = row
+    text = "\n".join(["t\tx\tf", *rows]).replace("\t", delimiter)
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(ValueError, match=re.escape(message)) as caught:
+        io.read(tmp_path / "log.csv")
+    assert "one decimal sign" in str(caught.value)
+
+
+def test_decimal_commas_alone_are_read_and_possible_thousands_told(tmp_path):
+    path = tmp_path / "log.csv"
+    rows = [f"{i}\t{i % 5}\t{i % 3}" for i in range(40)]
+    rows[20] = "20,5\t1\t12.03.2024"  # the first comma comes late; a date is no number
+    path.write_text("\n".join(["t [s]\tx\tf", *(row.replace("12.03.2024", "1") for row in rows)]))
+    recording, notes = io.read_with_notes(path)
+    assert recording.time[20] == 20.5 and notes == []
+    counts = [f"{i}\t{12 + i},{345 + i}\t{i % 3}" for i in range(40)]
+    path.write_text("\n".join(["t [s]\tx\tf", *counts]))
+    recording, notes = io.read_with_notes(path)
+    assert recording.position[0] == 12.345
+    assert "'12,345' in row 2" in notes[0] and "thousands" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("unit", "other", "remedy"),
+    [
+        ("m", "mm", "--scale position=0.001"),
+        ("mm", "m", "--scale position=1000"),
+        ("rad", "deg", "--scale position=0.0174532"),
+        ("mm", "rad", "--scale position=FACTOR"),
+    ],
+)
+def test_two_recordings_of_one_comparison_state_the_same_units(unit, other, remedy):
+    ours, theirs = (
+        Recording(range(3), range(3), range(3), units={"position": u}) for u in (unit, other)
+    )
+    with pytest.raises(ValueError, match=f"is in {other}, but in {unit}.*{remedy}"):
+        check_same_units(ours, theirs)
+    check_same_units(ours, ours)
+
+
+def test_newton_and_metre_give_way_where_they_may_be_no_statement():
+    stated = Recording(range(3), range(3), range(3), units={"force": "A", "position": "rad"})
+    check_same_units(stated, Recording(range(3), range(3), range(3)))
+    check_same_units(Recording(range(3), range(3), range(3)), stated)

@@ -7,8 +7,10 @@ import argparse
 import gc
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from io import TextIOWrapper
 from pathlib import Path
 
 from . import options
@@ -18,7 +20,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status: 0 done, 2 bad input or usage."""
     arguments = _parser().parse_args(argv)
     name = f"jaxfric {arguments.command}"
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what its encoding lacks is no reason to fail
+            stream.reconfigure(errors="backslashreplace")
     try:
+        options.check_outputs(arguments)
         _configure()
         status = arguments.run(arguments)
         sys.stdout.flush()
@@ -55,6 +61,8 @@ def _configure() -> None:
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    # An entry of a process that was killed is made anew; the user need not hear of it.
+    warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
 
 
 def _cache_folder() -> Path | None:
@@ -74,7 +82,7 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one line, as every other message of the command."""
 
     def error(self, message: str):
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        self.exit(2, f"{self.prog}: {options.printable(message)} (see {self.prog} --help)\n")
 
 
 class _Version(argparse.Action):
@@ -175,17 +183,36 @@ def _add_explain(commands) -> None:
     base = command.add_mutually_exclusive_group()
     base.add_argument(
         "--baseline",
-        default="gaussian",
         metavar="NAME_OR_MODEL.json",
-        help="a name that jaxfric models lists, or a saved model (default: gaussian)",
+        help="a name that jaxfric models lists, or a saved model (default: gaussian; with "
+        "--columns known_force=NAME your simulator's force, as it is)",
     )
     base.add_argument(
         "--simulation",
         metavar="FILE",
-        help="instead: the same reference run through your own simulator, or its force for the "
-        "recorded motion",
+        help="instead: your own simulator's force along the recorded motion, sample by sample, "
+        "which stands as it is; or its run of the same reference, which a model is fitted to",
+    )
+    base.add_argument(
+        "--mujoco",
+        metavar="MODEL.xml",
+        help="instead: a MuJoCo model or a URDF, whose force along the recorded motion is computed "
+        "(extra: mujoco)",
+    )
+    command.add_argument("--joint", metavar="NAME", help="of the model of --mujoco")
+    command.add_argument(
+        "--simulation-holdout",
+        metavar="FILE",
+        help="your simulator's force along the motion of --holdout",
     )
     command.add_argument("--holdout", metavar="FILE", help="a recording that is only judged on")
+    command.add_argument(
+        "--other-scale",
+        type=options.factors,
+        default={},
+        metavar="ROLE=FACTOR,…",
+        help="as --scale, for the file of --holdout or --simulation where its units differ",
+    )
     command.add_argument(
         "--fixed",
         action="store_true",
@@ -212,7 +239,7 @@ def _add_predict(commands) -> None:
     )
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="FILE", help="the recording")
-    command.add_argument("-o", "--out", type=options.output, required=True, metavar="OUT.csv")
+    command.add_argument("-o", "--out", type=options.table, required=True, metavar="OUT.csv")
     options.reading(command)
 
 
@@ -222,7 +249,7 @@ def _add_simulate(commands) -> None:
     )
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="REFERENCE.csv", help="set-point, or force, over time")
-    command.add_argument("-o", "--out", type=options.output, required=True, metavar="OUT.csv")
+    command.add_argument("-o", "--out", type=options.table, required=True, metavar="OUT.csv")
     command.add_argument(
         "--controller",
         type=options.controller,

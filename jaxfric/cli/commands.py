@@ -3,24 +3,26 @@
 import dataclasses
 import sys
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
 
-from .. import documents, models as known, tabulate
-from ..identification import identify as identify_recording
-from ..identified import Identified
-from ..io import read_with_notes, write_bytes, write_table, write_text
+from .. import models as known
+from ..data.io import read_with_notes, write_bytes, write_table, write_text
+from ..data.recording import Recording, uniform
+from ..data.writing import csv_text
+from ..identification import documents, tabulate
+from ..identification.identified import Identified
+from ..identification.identifying import identify as identify_recording
+from ..identification.projections import AbstractProjection, ClosedWindows, WeakForm
 from ..models import Model
 from ..programs import kept_in
-from ..projections import AbstractProjection, ClosedWindows, WeakForm
-from ..recording import Recording, uniform
 from ..signals import kernel_half_width, prepare
 from ..units import SI
-from .options import message
+from .options import message, printable, say, standard
 
 
 def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[str]]:
@@ -30,6 +32,8 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
         columns=arguments.columns,
         scale=arguments.scale,
         units=arguments.units,
+        period=arguments.period,
+        repair=arguments.repair,
         **more,
     )
 
@@ -42,18 +46,18 @@ def fitted(
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
     if model == "best":
-        from ..selection import select
+        from ..identification.selection import select
 
         model = select(recording).name
     with kept_in(programs_folder()):
-        prepared = prepare(uniform(recording))
+        log = uniform(recording)
         chosen: AbstractProjection | None = None
         if projection == "closed-windows":
             chosen = ClosedWindows()
         elif projection == "weak-form":
-            chosen = WeakForm(kernel_half_width(prepared))
+            chosen = WeakForm(kernel_half_width(prepare(log)))
         try:
-            found = identify_recording(model, prepared, projection=chosen, bounds=bounds)
+            found = identify_recording(model, log, projection=chosen, bounds=bounds)
         except ValueError as error:
             raise ValueError(f"{recording.source}: {error}") from error
     # Arrays of numpy: taking them apart compiles nothing.
@@ -84,16 +88,21 @@ def identify(arguments: Namespace) -> int:
             done.append(_identify(path, arguments))
         except (ValueError, OSError) as error:
             show_progress("")
-            print(f"jaxfric identify: {message(error)}", file=sys.stderr)
+            say(f"jaxfric identify: {message(error)}", file=sys.stderr)
             failures += 1
     show_progress("")
-    if arguments.json != "-" and done:
-        alone = arguments.projection == "auto"
-        text = tabulate.many(done) if many else tabulate.identification(done[0], automatic=alone)
-        print(text)
+    # First what lasts: who reads the table may close the pipe.
     if arguments.json and (done or many):
         put(arguments.json, documents.to_json(done if many else done[0]))
+    if done and not _printed(arguments):
+        alone = arguments.projection == "auto"
+        say(tabulate.many(done) if many else tabulate.identification(done[0], automatic=alone))
     return 2 if failures else 0
+
+
+def _printed(arguments: Namespace) -> bool:
+    """Whether a document goes to standard output, where no table may stand beside it."""
+    return any(path and standard(path) for path in (arguments.json, arguments.save))
 
 
 def check_bounds(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
@@ -112,7 +121,7 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
     name, found = fitted(recording, arguments.model, arguments.projection, arguments.bounds)
     document = documents.identification(found, recording, notes) | {"name": name}
     if arguments.save or arguments.plot:
-        if not np.all(np.isfinite([float(v) for v in found.model.parameters.values()])):
+        if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
     if arguments.save:
         put(arguments.save, documents.to_json(found.model.to_dict()))
@@ -137,41 +146,77 @@ def put(path: str, text: str) -> None:
         write_text(path, text)
 
 
+def put_table(path: str, columns: Mapping[str, Any], notes: Sequence[str], summary: str) -> None:
+    """Write a table, to standard output for `-`, and say what it is."""
+    if path == "-":
+        arrays = {name: np.asarray(column) for name, column in columns.items()}
+        sys.stdout.write(csv_text(arrays))
+    else:
+        write_table(path, columns)
+    beside = sys.stderr if standard(path) else sys.stdout
+    say("\n".join([*(f"  {note}" for note in notes), f"{path}: {summary}"]), file=beside)
+
+
 def show_progress(text: str) -> None:
     """One line on standard error that the next one replaces; only on a terminal."""
     if sys.stderr.isatty():
-        print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+        print(f"\r\x1b[K{printable(text)}", end="", file=sys.stderr, flush=True)
 
 
 def predict(arguments: Namespace) -> int:
-    """`jaxfric predict`: force beside the measured one, as a table."""
-    from ..prediction import predict as predict_force, relative_error
+    """`jaxfric predict`: force beside the measured one, as a table.
+
+    The force error is that of the rows in which the column `in_motion` is 1.
+    """
+    from ..simulation.prediction import delay_of, in_motion, relative, residual
 
     model = _load(arguments.model)
     recording, notes = read(arguments.file, arguments)
     recording = _in_units(recording, model, arguments)
     needed = model.term.coordinates - {"acceleration", "time", "position", "velocity"}
+    needed -= {"predicted_force"}  # predict works it out
     if missing := sorted(needed - set(recording.channels)):
         raise ValueError(
             f"{arguments.file}: the model needs {', '.join(missing)}. Name the columns: "
             f"--columns {','.join(f'{role}=NAME' for role in missing)}."
         )
-    prepared = prepare(uniform(recording))
-    force = np.asarray(predict_force(model, prepared))[: recording.num_samples]
-    columns = {"time": recording.time, "force": force, "measured_force": recording.force}
-    write_table(arguments.out, columns)
-    for note in notes:
-        print(f"  {note}")
-    error = float(relative_error(model, prepared))
+    left, moving = residual(model, recording), in_motion(recording, delay_of(model))
+    notes = notes + _unknown(model, ~np.isfinite(left), moving, arguments)
+    measured = np.asarray(recording.force)
+    force = measured - left
+    columns = {"time": recording.time, "force": force, "measured_force": measured}
+    error = relative(left[moving], measured[moving])
     share = f"{error:.2%}" if np.isfinite(error) else "undefined: no slip, or no force"
-    print(f"{arguments.out}: {force.size} samples; force error {share}")
+    columns["in_motion"] = moving.astype(int)
+    put_table(arguments.out, columns, notes, f"{force.size} samples; force error {share}")
     return 0
+
+
+def _unknown(model: Model, blank: np.ndarray, moving: np.ndarray, arguments) -> list[str]:
+    """A note where the model says no force; raises `ValueError` where that is in motion."""
+    lacking = [n for n, value in model.parameters.items() if not np.isfinite(float(value))]
+    if np.any(blank & moving):
+        if not lacking:
+            raise ValueError(
+                f"{arguments.model}: gives no finite force for {arguments.file}. Are its values "
+                "those that were identified?"
+            )
+        raise ValueError(
+            f"{arguments.model}: has no value for {', '.join(lacking)}, which "
+            f"{arguments.file} needs: identify on a recording that moves in both directions."
+        )
+    if not blank.any():
+        return []
+    return [
+        f"{np.count_nonzero(blank)} samples at rest have no force, as {arguments.model} has no "
+        f"value for {', '.join(lacking)}."
+    ]
 
 
 def simulate(arguments: Namespace) -> int:
     """`jaxfric simulate`: motion and force of a model, as a table."""
-    from .. import control
-    from ..simulation import simulate as simulate_model
+    from ..simulation import control
+    from ..simulation.simulating import simulate as simulate_model
 
     model = _load(arguments.model)
     controller = None
@@ -186,7 +231,10 @@ def simulate(arguments: Namespace) -> int:
             f"{arguments.file}: no force drives the axis. Name the column (--columns force=NAME) "
             "or follow a set-point (--controller pd:kp=…,kd=…)."
         )
-    run = simulate_model(model, reference, controller)
+    try:
+        run = simulate_model(model, reference, controller)
+    except ValueError as error:
+        raise ValueError(f"{arguments.model}, {arguments.file}: {error}") from error
     if not np.all(np.isfinite(np.asarray(run.position))):
         raise ValueError(
             f"{arguments.file}: the simulated motion grows without bound. Check the gains and "
@@ -195,10 +243,7 @@ def simulate(arguments: Namespace) -> int:
     columns = {"time": run.time, "force": run.force, "position": run.position}
     if run.velocity is not None:
         columns["velocity"] = run.velocity
-    write_table(arguments.out, columns | run.channels)
-    for note in notes:
-        print(f"  {note}")
-    print(f"{arguments.out}: {run.num_samples} samples")
+    put_table(arguments.out, columns | run.channels, notes, f"{run.num_samples} samples")
     return 0
 
 
@@ -230,5 +275,5 @@ def _in_units(recording: Recording, model: Model, arguments: Namespace) -> Recor
 
 def models(arguments: Namespace) -> int:
     """`jaxfric models`: names and equations."""
-    print(tabulate.models())
+    say(tabulate.models())
     return 0

@@ -3,11 +3,13 @@
 from argparse import Namespace
 from pathlib import Path
 
-from .. import concealed, documents, tabulate
+from ..data.io import read, write_table, write_text
 from ..explanation import explain
-from ..io import read, write_table, write_text
+from ..identification import documents, tabulate
 from ..report import page, pictures
+from ..validation import concealed
 from . import commands
+from .options import say
 
 # One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.
 SEED = 868
@@ -24,13 +26,13 @@ def run(arguments: Namespace) -> int:
     recording, holdout = (read(folder / f"{name}.csv") for name in ("axis", "holdout"))
     name, fitted = commands.fitted(recording, machine.baseline)
     document = documents.identification(fitted, recording) | {"name": name}
-    print("A simulated axis in closed loop, with an encoder, noise, and something concealed.\n")
-    print(tabulate.identification(document))
-    print("\nWhat does this model leave out?\n")
+    say("A simulated axis in closed loop, with an encoder, noise, and something concealed.\n")
+    say(tabulate.identification(document))
+    say("\nWhat does this model leave out?\n")
     found = explain(recording, machine.baseline, holdout)
     told = found.to_dict()
-    print(tabulate.explanation(told))
-    print(f"\nConcealed was: {_truth(machine)}")
+    say(tabulate.explanation(told))
+    say(f"\nConcealed was: {_truth(machine)}")
     write_text(folder / "identification.json", documents.to_json(document))
     write_text(folder / "explanation.json", documents.to_json(told))
     write_text(folder / "model.json", documents.to_json(found.model.to_dict()))
@@ -43,9 +45,9 @@ def run(arguments: Namespace) -> int:
         written += ["friction.png", "explanation.html"]
     except ValueError as error:
         missing = f"\nNo pictures: {error}"
-    print(f"\nWritten to {folder}: {', '.join(written)}{missing}")
+    say(f"\nWritten to {folder}: {', '.join(written)}{missing}")
     files = f"{folder / 'axis.csv'} --holdout {folder / 'holdout.csv'}"
-    print(f"The same by hand: jaxfric explain {files} --baseline {machine.baseline}")
+    say(f"The same by hand: jaxfric explain {files} --baseline {machine.baseline}")
     return 0
 
 

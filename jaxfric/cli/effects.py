@@ -2,8 +2,10 @@
 
 from argparse import Namespace
 
-from .. import documents, glossary
+from ..identification import documents
+from ..terms import glossary
 from .commands import put
+from .options import say
 
 
 def run(arguments: Namespace) -> int:
@@ -12,7 +14,7 @@ def run(arguments: Namespace) -> int:
         names = [arguments.name] if arguments.name else []
         put(arguments.json, documents.to_json(glossary.document(names)))
     elif arguments.name:
-        print(glossary.detail(arguments.name))
+        say(glossary.detail(arguments.name))
     else:
-        print(glossary.overview())
+        say(glossary.overview())
     return 0

@@ -1,23 +1,32 @@
 """`jaxfric explain`: what a model leaves out of a recording."""
 
+import dataclasses
 from argparse import Namespace
 from pathlib import Path
 
-from .. import documents, tabulate
+from ..data.recording import Recording, check_same_units
 from ..explanation import Explanation, explain
-from ..io import write_text
+from ..explanation.baseline import baseline_of
+from ..identification import documents, tabulate
 from ..models import Model, load, named
 from ..programs import kept_in
-from ..recording import Recording
-from ..report import page
+from ..report import charts, page
+from ..simulators import Known, Mujoco, same_motion
+from ..terms import KNOWN_FORCE
 from .commands import programs_folder, put, read
+from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
     """Explain one recording; print it, and write what was asked for."""
+    if arguments.report:
+        charts.library()
     recording, notes = read(arguments.file, arguments)
-    holdout = read(arguments.holdout, arguments)[0] if arguments.holdout else None
-    baseline = _baseline(arguments)
+    holdout = None
+    if arguments.holdout:
+        holdout, more = _beside(arguments.holdout, recording, arguments)
+        notes = notes + [f"Held out: {note}" for note in more]
+    baseline = _baseline(arguments, recording, holdout)
     try:
         with kept_in(programs_folder()):
             found = explain(
@@ -27,25 +36,77 @@ def run(arguments: Namespace) -> int:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()
     document["recording"]["notes"] = notes
-    if arguments.json != "-":
-        print(tabulate.explanation(document))
-    write(found, document, arguments)
+    texts = written(found, document, arguments)
+    # First what lasts: who reads the table may close the pipe.
+    for path, text in texts.items():
+        put(path, text)
+    if not any(standard(path) for path in texts):
+        say(tabulate.explanation(document))
     return 0
 
 
-def write(found: Explanation, document: dict, arguments: Namespace) -> None:
-    """The JSON, the model and the page, each where it was asked for."""
+def written(found: Explanation, document: dict, arguments: Namespace) -> dict[str, str]:
+    """The JSON, the model and the page by the path that was given for each, all of them ready."""
+    texts = {}
     if arguments.json:
-        put(arguments.json, documents.to_json(document))
+        texts[arguments.json] = documents.to_json(document)
     if arguments.save:
-        put(arguments.save, documents.to_json(found.model.to_dict()))
+        texts[arguments.save] = documents.to_json(found.model.to_dict())
     if arguments.report:
-        write_text(arguments.report, page.render(document, found.curves))
+        texts[arguments.report] = page.render(document, found.curves)
+    return texts
 
 
-def _baseline(arguments: Namespace) -> str | Model | Recording:
+def _simulation(
+    arguments: Namespace, recording: Recording, holdout: Recording | None
+) -> Recording | Known:
+    """Another simulator's force along the recorded motion, or its run of the same reference."""
+    ours = _beside(arguments.simulation, recording, arguments)[0]
+    if not same_motion(recording, ours):
+        if arguments.simulation_holdout:
+            raise ValueError(
+                f"{arguments.simulation}: this is not the recorded motion, so that its force is "
+                "not the simulator's along it; --simulation-holdout needs that. Compute the force "
+                "at the recorded positions (inverse dynamics), one row for each sample."
+            )
+        return ours
+    if holdout is None:
+        return Known(ours.force)
+    if not arguments.simulation_holdout:
+        return ours
+    theirs = _beside(arguments.simulation_holdout, recording, arguments)[0]
+    if not same_motion(holdout, theirs):
+        raise ValueError(
+            f"{arguments.simulation_holdout}: this is not the motion of {arguments.holdout}. "
+            "Compute the simulator's force at its positions, one row for each sample."
+        )
+    return Known(ours.force, theirs.force)
+
+
+def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Recording, list[str]]:
+    """Another recording of the comparison, in the units of the first, and its notes."""
+    scale = arguments.scale | arguments.other_scale
+    other, notes = read(path, Namespace(**vars(arguments) | {"scale": scale}))
+    units = recording.unit_names
+    scaled = {role: units[role] for role in arguments.other_scale if role in units}
+    other = dataclasses.replace(other, units=tuple((other.unit_names | scaled).items()))
+    check_same_units(recording, other, "other-scale")
+    return other, notes
+
+
+def _baseline(
+    arguments: Namespace, recording: Recording, holdout: Recording | None
+) -> str | Model | Recording | Known | Mujoco:
+    if arguments.joint and not arguments.mujoco:
+        raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
+    if arguments.mujoco:
+        return Mujoco(arguments.mujoco, arguments.joint)
     if arguments.simulation:
-        return read(arguments.simulation, arguments)[0]
+        return _simulation(arguments, recording, holdout)
+    if arguments.simulation_holdout:
+        raise ValueError("--simulation-holdout goes with --simulation, which is not given.")
+    if arguments.baseline is None:
+        return Known() if KNOWN_FORCE in recording.channels else "gaussian"
     text = arguments.baseline
     if not text.endswith(".json"):
         if Path(text).is_file():
@@ -56,8 +117,13 @@ def _baseline(arguments: Namespace) -> str | Model | Recording:
         named(text)
         return text
     try:
-        return load(Path(text).read_text(encoding="utf-8"))
+        model = load(Path(text).read_text(encoding="utf-8"))
     except (ValueError, UnicodeDecodeError) as error:
         raise ValueError(
             f"{text}: {error} A model is written by jaxfric identify --save."
         ) from None
+    try:
+        baseline_of(model)
+    except ValueError as error:
+        raise ValueError(f"{text}: {error}") from None
+    return model

@@ -8,6 +8,7 @@ from ..export import Exported, export
 from ..models import Model
 from ..units import VELOCITY, spell
 from .commands import _load, put
+from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
@@ -24,9 +25,9 @@ def run(arguments: Namespace) -> int:
     except ValueError as error:
         raise ValueError(f"{arguments.model}: {error}") from error
     put(arguments.out, found.text)
-    alone = arguments.out == "-"
+    alone = standard(arguments.out)
     head = "" if alone else f"{arguments.out}: "
-    print(f"{head}{summary(found, model, arguments.to)}", file=sys.stderr if alone else sys.stdout)
+    say(f"{head}{summary(found, model, arguments.to)}", file=sys.stderr if alone else sys.stdout)
     return 0
 
 

@@ -10,9 +10,11 @@ from pathlib import Path
 import jax
 
 from .. import fleet
+from ..data.io import write_bytes
+from ..data.targets import same
 from ..fleet import journal, running, tables, telling
-from ..io import write_bytes
 from .commands import check_bounds, show_progress
+from .options import say
 
 
 def run(arguments: Namespace) -> int:
@@ -20,13 +22,7 @@ def run(arguments: Namespace) -> int:
     check_bounds(arguments.model, arguments.bounds)
     tables.check(arguments.out)
     _devices(arguments)
-    files = [
-        file
-        for file in fleet.find(arguments.patterns, arguments.axis, arguments.group)
-        if Path(file.path).absolute() != Path(arguments.out).absolute()
-    ]
-    if not files:
-        raise ValueError(f"{arguments.out}: is the only file that matches.")
+    files = _files(arguments)
     if arguments.plot:
         from ..report import fleet as picture, pictures
 
@@ -48,11 +44,26 @@ def run(arguments: Namespace) -> int:
         format = Path(arguments.plot).suffix.lstrip(".").lower()
         write_bytes(arguments.plot, picture.render(files, rows, found, format))
     kept.remove()
-    print(f"{arguments.out}: {len(files)} recordings, model {arguments.model}; ", end="")
-    print(telling.summary(files, rows, found))
+    say(f"{arguments.out}: {len(files)} recordings, model {arguments.model}; ", end="")
+    say(telling.summary(files, rows, found))
+    for sentence in fleet.mixed_units(files, rows, arguments.model):
+        say(f"\n{sentence}")
     if troubles := telling.troubles(files, rows):
-        print(f"\n{troubles}")
+        say(f"\n{troubles}")
     return 0
+
+
+def _files(arguments: Namespace) -> list[fleet.File]:
+    """The recordings; an earlier table that the patterns match is none, and will be replaced."""
+    matching = fleet.find(arguments.patterns, arguments.axis, arguments.group)
+    files = [file for file in matching if not same(file.path, arguments.out)]
+    if len(files) < len(matching) and not tables.is_one(arguments.out):
+        raise ValueError(
+            f"{arguments.out}: is one of the recordings, which --out would replace; name another."
+        )
+    if not files:
+        raise ValueError(f"{arguments.out}: is the only file that matches.")
+    return files
 
 
 def _options(arguments: Namespace) -> fleet.Options:
@@ -63,6 +74,8 @@ def _options(arguments: Namespace) -> fleet.Options:
         arguments.columns,
         arguments.scale,
         arguments.units,
+        arguments.period,
+        arguments.repair,
     )
 
 

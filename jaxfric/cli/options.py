@@ -1,19 +1,60 @@
 """Values of the command's options, and the message of an error. Imports nothing heavy."""
 
 import math
-from argparse import ArgumentParser, ArgumentTypeError
+import os
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
+from typing import TextIO
+
+from ..data.printable import printable
+from ..data.targets import replaced, same, standard
 
 # Gains of each controller that `simulate` knows; `limit` bounds the force of any of them.
 CONTROLLERS = {"pd": ("kp", "kd"), "pid": ("kp", "ki", "kd"), "cascade": ("kp", "kv")}
+TABLES = (".csv", ".npz", ".parquet")
 PICTURES = ("png", "pdf", "svg")
 
 
+# What the options of every command read, and what they write.
+READ = (
+    "file", "files", "model", "baseline", "simulation", "simulation_holdout", "holdout", "mujoco"
+)  # fmt: skip
+WRITTEN = ("out", "json", "save", "report", "plot")
+
+
+def say(text: str, end: str = "\n", file: TextIO | None = None) -> None:
+    """Print lines for a person, in which nothing from outside steers the terminal."""
+    print(printable(text, keep="\n"), end=end, file=file)
+
+
 def message(error: BaseException) -> str:
-    """What an error says, with the file's name where the system reports one."""
+    """What an error says, in one line, with the file's name where the system reports one."""
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror or error}"
-    return str(error) or type(error).__name__
+        return printable(f"{os.fsdecode(error.filename)}: {error.strerror or error}")
+    return printable(str(error) or type(error).__name__)
+
+
+def check_outputs(arguments: Namespace) -> None:
+    """Raises `ValueError` where one output would replace another, or an input."""
+    given = vars(arguments)
+    outputs = {f"--{name}": given[name] for name in WRITTEN if given.get(name)}
+    files = [path for name in READ for path in _texts(given.get(name)) if os.path.isfile(path)]
+    for number, (option, path) in enumerate(outputs.items()):
+        for other, there in list(outputs.items())[:number]:
+            if same(path, there) and _kept(path):
+                raise ValueError(f"{other} and {option} are both {path}; give each its own.")
+        if any(same(path, there) for there in files):
+            raise ValueError(f"{path}: is read, and {option} would replace it; write elsewhere.")
+
+
+def _texts(value: object) -> list[str]:
+    values = value if isinstance(value, list) else [value]
+    return [text for text in values if isinstance(text, str)]
+
+
+def _kept(path: str) -> bool:
+    """Whether what is written there stays: standard output and files, not the null device."""
+    return standard(path) or replaced(path) is not None
 
 
 def names(text: str) -> dict[str, str]:
@@ -81,9 +122,25 @@ def controller(text: str) -> tuple[str, dict[str, float]]:
 
 def output(text: str) -> str:
     """A path to write to, its folder there: said before the work instead of after it."""
-    if text != "-" and not Path(text).absolute().parent.is_dir():
+    if not text:
+        raise ArgumentTypeError("the name of the file is empty")
+    if text == "-":
+        return text
+    try:
+        target = replaced(text)
+    except ValueError as error:
+        raise ArgumentTypeError(str(error).rstrip(".")) from None
+    if target is not None and not target.parent.is_dir():
         raise ArgumentTypeError(f"{text}: there is no folder {Path(text).parent}; make it first")
     return text
+
+
+def table(text: str) -> str:
+    """A path to write a table to, of a kind that can be written."""
+    if output(text) == "-" or replaced(text) is None or Path(text).suffix.lower() in TABLES:
+        return text
+    kinds = ", ".join(TABLES)
+    raise ArgumentTypeError(f"{text}: tables are written as {kinds}; use that suffix")
 
 
 def picture(text: str) -> str:
@@ -158,6 +215,19 @@ def reading(command: ArgumentParser) -> None:
         default={},
         metavar="force=N,position=m",
         help="after scaling; they name, they do not convert",
+    )
+    group.add_argument(
+        "--period",
+        type=factors,
+        default={},
+        metavar="position=NUMBER",
+        help="the position is counted modulo this, before scaling: make it continuous",
+    )
+    group.add_argument(
+        "--no-repair",
+        action="store_false",
+        dest="repair",
+        help="leave clock, samples and position as they are (not finite samples are masked)",
     )
 
 

@@ -3,9 +3,10 @@
 from argparse import Namespace
 from pathlib import Path
 
-from .. import proof
-from ..io import write_text
+from ..data.io import write_text
+from ..validation import proof
 from . import _configure
+from .options import say
 
 
 def run(arguments: Namespace) -> int:
@@ -24,7 +25,7 @@ def run(arguments: Namespace) -> int:
         f"--size {size[0]:g}:{size[1]:g}"
     )
     write_text(folder / "report.md", proof.report(scores, command, pictures))
-    print(proof.short(scores))
+    say(proof.short(scores))
     written = ", ".join(["report.md", *pictures, "sealed/", "answers/"])
-    print(f"\nWritten to {folder}: {written}{missing}")
+    say(f"\nWritten to {folder}: {written}{missing}")
     return 0

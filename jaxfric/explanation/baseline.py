@@ -1,19 +1,22 @@
 """What a recording is compared with: a model's name, a model, or another simulator's output."""
 
+import itertools
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from ..identified import Identified
-from ..models import Model, named
-from ..recording import Recording
+from ..data.recording import Recording, described
+from ..identification.identified import Identified
+from ..models import Model, named, require
+from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled
 from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
-from .naming import LEAST_SHARE, Named
+from .naming import LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
-from .regression import Fit, fit
+from .regression import RANK, Fit, fit, orthonormal, solve
 
 
 class Baseline(NamedTuple):
@@ -39,19 +42,36 @@ class Mismatch(NamedTuple):
 
 
 def baseline_of(given) -> Baseline:
-    """The baseline that a name, a sum of terms, a model or an identification stands for."""
+    """The baseline that a name, a sum of terms, a model or an identification stands for.
+
+    **Raises:** `ValueError` for anything else, and for a model that lacks values.
+    """
     if isinstance(given, str):
         return Baseline(named(given), given)
     if isinstance(given, Identified):
         given = given.model
     if isinstance(given, Model):
-        return Baseline(given.term, "model", given)
+        require(given, "explain (baseline)")
+        _check_values(given)
+        name = "simulator" if KNOWN_FORCE in given.term.coordinates else "model"
+        return Baseline(given.term, name, given)
     if isinstance(given, AbstractTerm):
         return Baseline(given, "model")
     raise ValueError(
-        f"baseline is {type(given).__name__}; give a model's name, a sum of terms, a Model, an "
-        "Identified, or a Recording of another simulator."
+        f"baseline is {described(given)}; give a model's name, a sum of terms, a Model, an "
+        "Identified, simulators.Known(force), a function from a recording to a simulator's force, "
+        "or a Recording of another simulator."
     )
+
+
+def _check_values(model: Model) -> None:
+    """Raise `ValueError` for a model of which not every value is known."""
+    lacking = [n for n, value in model.parameters.items() if not np.isfinite(float(value))]
+    if lacking:
+        raise ValueError(
+            f"The baseline has no value for {', '.join(lacking)}, which its recording did not "
+            "show. Give the model's name, or its terms alone, to have all of them fitted."
+        )
 
 
 def simulated(simulation: Recording, found: Named) -> Baseline:
@@ -74,49 +94,115 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     return start._replace(columns=columns, residual=left, energy=float(left @ left))
 
 
-def as_given(model: Model, now: Fit, evidence: Evidence) -> Fit:
+def as_given(model: Model, now: Fit, evidence: Evidence, free: tuple[int, ...] = ()) -> Fit:
     """A fit with its base, the first term, at the model's own values, the others fitted beside.
 
-    The derivatives are those of all parameters, which say what these values are worth.
+    `free`: parameters of the base that are fitted too, numbers among affine and nonlinear ones. The
+    derivatives are those of all parameters, which say what these values are worth.
     """
     given, others = at_values(model, evidence), now.terms[1:]
+    count = len(given.alphas[0])
+    searched = given.betas[0].copy()
+    for i in free:
+        if i >= count:
+            searched[i - count] = now.betas[0][i - count]
+    kept = [i for i in range(count) if i not in free]
     for _ in range(2):  # some terms act on what the others predict
         seen = with_predictions(evidence, now)
-        beside = seen._replace(target=given.residual)
-        rest = fit(others, beside, now.betas[1:], 6) if others else given.only([])
-        betas = (*given.betas, *rest.betas)
-        now = fit(now.terms, seen, betas, 0)._replace(
-            betas=betas,
-            alphas=(*given.alphas, *rest.alphas),
-            residual=rest.residual,
-            energy=rest.energy,
+        if others and not free:
+            beside = seen._replace(target=given.residual)
+            now = now._replace(betas=(searched, *fit(others, beside, now.betas[1:], 6).betas))
+        now = fit(now.terms, seen, (searched, *now.betas[1:]), 0)
+        alpha = np.zeros(now.columns.shape[1])
+        alpha[kept] = given.alphas[0][kept]
+        open_ = [i for i in range(len(alpha)) if i not in kept]
+        alpha[open_] = solve(now.columns[:, open_], seen.target - now.columns @ alpha)
+        left = seen.target - now.columns @ alpha
+        ends = np.cumsum([len(a) for a in now.alphas])[:-1]
+        now = now._replace(
+            betas=(searched, *now.betas[1:]),
+            alphas=tuple(np.split(alpha, ends)),
+            residual=left,
+            energy=float(left @ left),
         )
     return now
+
+
+# More wrong values than this are another machine.
+MOST_WRONG = 5
+# The normal quantile of 1 % shared among twenty parameters.
+SURE = 3.5
 
 
 def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:
     """Which of a model's values are wrong on a recording; `None` if none is.
 
-    The refitted parameters differ from the given ones by more than their intervals (all of them
-    together at 1 %), and by enough of the residual.
+    `refitted`: with all values free, beside the terms found: values and missing physics are judged
+    together. The refitted parameters differ from the given ones (all of them together at 1 %) and
+    take enough of the residual. Of those the fewest are moved that leave no more than all of them
+    do, but for what no sensor of force resolves.
     """
-    given = at_values(model, evidence)
+    given = as_given(model, refitted, evidence)
     share = 1 - refitted.energy / given.energy if given.energy > 0 else 0.0
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    empty = given._replace(columns=given.slopes)
-    raw = (refitted.jacobian / np.maximum(np.abs(refitted.jacobian).max(axis=0), 1e-300)).T[None]
+    count, counts = len(given.alphas[0]), len(given.betas[0])
+    affine, slopes = refitted.columns, refitted.slopes
+    own = np.concatenate([affine[:, :count], slopes[:, :counts]], axis=1)
+    beside = orthonormal(np.concatenate([affine[:, count:], slopes[:, counts:]], axis=1))
+    own = own - beside @ (beside.T @ own)
+    raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
+    empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
     scan = Judge(empty, block, seed)(raw.astype(np.float32))
     p_value = float((1 + np.sum(scan.drawn >= scan.gain[0])) / (1 + len(scan.drawn)))
     if share < LEAST_SHARE or p_value > LEVEL:
         return None
-    estimates = list(spelled.estimates(refitted, block, dict(model.units))[0].values())
     before = [*given.alphas[0], *given.betas[0]]
-    distance = [
-        abs(float(e.value) - b) / max(float(e.standard_error), 1e-300)
-        for e, b in zip(estimates, before, strict=False)
-    ]
-    limit = 3.5  # the normal quantile of 1 % shared among twenty parameters
-    moved = {i: b for i, (b, d) in enumerate(zip(before, distance, strict=True)) if d > limit}
-    if not moved:
-        moved = {int(np.argmax(distance)): before[int(np.argmax(distance))]}
-    return Mismatch(moved, float(share), p_value, given.energy)
+    free = _fewest(
+        own, given.residual, block, LINEARITY**2 * float(evidence.force @ evidence.force)
+    )
+    if not free:
+        return None
+    return Mismatch({i: before[i] for i in sorted(free)}, float(share), p_value, given.energy)
+
+
+def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
+    """Numbers of the fewest columns that leave what all of them leave, N², but for `enough`.
+
+    Of every size the best subset; none of whose columns is within its interval of nothing.
+    """
+    size = np.linalg.norm(own, axis=0)
+    used = np.flatnonzero(size > 0)
+    columns = own[:, used] / size[used]
+    gram, pull = columns.T @ columns, columns.T @ left
+    most = _taken(gram, pull, range(len(used)))
+    found: tuple[int, ...] = ()
+    for count in range(1, min(len(used), MOST_WRONG) + 1):
+        if most - _taken(gram, pull, found) < enough:
+            break
+        better = max(
+            itertools.combinations(range(len(used)), count),
+            key=lambda some: _taken(gram, pull, some),
+        )
+        if not _sure(columns[:, better], left, block):
+            break
+        found = better
+    return [int(used[i]) for i in found]
+
+
+def _taken(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
+    """What some of the columns take off the energy of what is left."""
+    index = list(some)
+    if not index:
+        return 0.0
+    solved = np.linalg.lstsq(gram[np.ix_(index, index)], pull[index], rcond=RANK**2)[0]
+    return float(solved @ pull[index])
+
+
+def _sure(columns: np.ndarray, left: np.ndarray, block: np.ndarray) -> bool:
+    """Whether each column's part is beyond noise like what all of them leave, by blocks."""
+    inverse = np.linalg.pinv(columns, rcond=RANK)
+    parts = inverse @ left
+    noise = left - columns @ parts
+    count = int(block[-1]) + 1
+    sums = np.stack([np.bincount(block, row * noise, count) for row in inverse])
+    return bool(np.all(np.abs(parts) > SURE * np.sqrt(np.sum(sums**2, axis=1))))

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import terms as laws
-from ..catalogue import CATALOGUE, Effect
-from ..effects import EFFECTS
-from ..recording import Recording
+from ..data.recording import Recording
 from ..terms.base import AbstractTerm, Directional, summands
+from ..terms.catalogue import CATALOGUE, Effect
+from ..terms.effects import EFFECTS
 from ..terms.friction import AbstractBump
 from .evidence import NODES, Evidence
 from .lines import Lines, line_frequencies

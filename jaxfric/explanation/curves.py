@@ -115,9 +115,9 @@ def _series(evidence: Evidence, before: Fit, after: Fit, rephased=frozenset()) -
     time = evidence.elapsed[evidence.centre]
     series = {
         "time": time,
-        "measured": evidence.target,
-        "before": evidence.target - residual(before, evidence),
-        "after": evidence.target - residual(after, evidence, rephased),
+        "measured": evidence.force,
+        "before": evidence.force - residual(before, evidence),
+        "after": evidence.force - residual(after, evidence, rephased),
     }
     return {name: values[::step].tolist() for name, values in series.items()}
 

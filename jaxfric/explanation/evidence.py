@@ -19,8 +19,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import programs, signals
-from ..recording import Recording, pad
-from ..terms import DryCompliance, ElasticBacklash
+from ..data.recording import Recording, pad
+from ..terms import KNOWN_FORCE, DryCompliance, ElasticBacklash
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -42,7 +42,8 @@ class Evidence(NamedTuple):
     - `nodes`: how many of them are real.
     - `average` and `slope`: weights of the nodes around every third one, 1 and 1/s, `(R, K)`;
       `rows`: which of these lie in slip, `(J,)`.
-    - `target`: the force of each row, N, `(J,)`; `side`: its direction, ±1.
+    - `force`: that of each row, N, `(J,)`; `target`: without what another simulator has computed,
+      where the recording brings that; `side`: the direction, ±1.
     - `centre`: the node in the middle of each row, `(J,)`.
     - `elapsed`: time since the start without interruptions, s, at the nodes, `(M,)`.
     - `limits`: magnitudes of the recording, `Scales` of floats; `reach`: the kernel's half-width,
@@ -55,6 +56,7 @@ class Evidence(NamedTuple):
     average: np.ndarray
     slope: np.ndarray
     rows: np.ndarray
+    force: np.ndarray
     target: np.ndarray
     side: np.ndarray
     centre: np.ndarray
@@ -172,7 +174,7 @@ def gather(
     **Arguments:** `recording`, signals of shape `(N,)`; `half_width` of the kernel in samples, by
     default [`kernel_half_width`][jaxfric.signals.kernel_half_width]; `delay`, s, by which the
     force is taken later; `reversals`: rows that reach across a reversal too, but none at rest,
-    for judging a model as [`relative_error`][jaxfric.prediction.relative_error] does.
+    for judging a model as [`relative_error`][jaxfric.simulation.prediction.relative_error] does.
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
@@ -198,7 +200,9 @@ def gather(
         )
     motion = _padded(parts, prepared)
     centre = index[rows, NODES]
-    target = np.sum(average * parts["force"][index], axis=1)[rows]
+    force = np.sum(average * parts["force"][index], axis=1)[rows]
+    known = parts.get(f"channel {KNOWN_FORCE}")
+    target = force if known is None else force - np.sum(average * known[index], axis=1)[rows]
     average, slope = _averaged(average), _averaged(slope)
     pads = motion.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
@@ -208,6 +212,7 @@ def gather(
         average=average,
         slope=slope,
         rows=rows,
+        force=force,
         target=target,
         side=np.sign(parts["velocity"][centre]),
         centre=centre,
@@ -228,8 +233,8 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
     padded = pad(nameless, _length(recording.num_samples))
     if padded.velocity is not None:
         return padded, 0.0
-    half_width = int(signals._choose(padded))
-    return signals.prepare(padded, half_width), signals.smoothing(half_width)
+    choice = signals.choose(padded)
+    return signals.prepare(padded, choice), signals.smoothing(choice)
 
 
 _scales = programs.kept(signals.scales)
@@ -289,7 +294,7 @@ def _node_signals(
     # and the columns' weights take it off again, so that force and columns are averaged alike. So
     # is what the derivative took off the velocity, which would look like a load on a spring.
     inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    for name in set(means) - {"force", "time", "elapsed"}:
+    for name in set(means) - {"force", f"channel {KNOWN_FORCE}", "time", "elapsed"}:
         values = means[name]
         bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
         means[name] = values.copy()

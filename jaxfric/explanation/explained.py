@@ -3,10 +3,16 @@
 import dataclasses
 import math
 from collections.abc import Mapping
+from html import escape
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from ..identification import tabulate
+from ..identification.uncertainty import Estimate
+from ..looks import drawing, html, text
 from ..models import Model
-from ..uncertainty import Estimate
+from . import pictures
 
 SCHEMA = "jaxfric.explanation/1"
 
@@ -16,6 +22,12 @@ VERDICTS = {
     "partly_explained": "Named physics accounts for a part; structure is left, or terms overlap.",
     "unexplained": "Something is missing that no effect of the library accounts for.",
 }
+
+# Pictures in a notebook and in a window: what fits on a screen.
+SKETCHED, DRAWN = 4, 6
+
+# Instead of a verdict's words, where what was measured contradicts itself.
+DOUBTED = "Until that is put right, nothing is named."
 
 
 class Moved(NamedTuple):
@@ -62,6 +74,14 @@ class Explanation:
     - `model`: baseline and found terms, for predict, simulate and export.
     - `baseline`: the baseline with its parameters; `baseline_parameters` with standard errors.
     - `curves`: what pictures are drawn from.
+    - `warnings`: what makes the answer doubtful, each with `name`, `text` and whether it is
+      `severe`: then what would be said beside it is certain to be wrong.
+    - `holdout_model`: the model as it stands on the held-out recording: `model`, but for waves at
+      their phase there and without what belongs to a moment (`fit["holdout_adjusted"]` says which).
+
+    `fit["force_error"]` is `jf.predict(model, recording)` and a subtraction, as `force_error` in
+    `jaxfric.simulation.prediction`; `fit["filtered_force_error"]` the same through the kernel by
+    which effects are looked for, `width` its half-width, s.
     """
 
     verdict: str
@@ -75,9 +95,15 @@ class Explanation:
     baseline_parameters: dict[str, Estimate]
     recording: dict[str, Any]
     curves: dict[str, Any] = dataclasses.field(default_factory=dict, repr=False)
+    warnings: list[dict[str, Any]] = dataclasses.field(default_factory=list)
+    holdout_model: Model | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The explanation as plain data (schema `jaxfric.explanation/1`)."""
+        return {**self._told(), "model": self.model.to_dict(), **self._elsewhere()}
+
+    def _told(self) -> dict[str, Any]:
+        """The document without models."""
         return {
             "schema": SCHEMA,
             "recording": self.recording,
@@ -86,6 +112,7 @@ class Explanation:
                 "parameters": _estimates(self.baseline_parameters),
             },
             "verdict": self.verdict,
+            "warnings": self.warnings,
             "summary": self.summary,
             "where": self.where,
             "findings": [
@@ -95,27 +122,119 @@ class Explanation:
             ],
             "fit": self.fit,
             "not_visible": self.not_visible,
-            "model": self.model.to_dict(),
         }
+
+    def __repr__(self) -> str:
+        return text.attempt(
+            lambda: text.text(tabulate.explained(self._told())),
+            lambda: f"Explanation(verdict={self.verdict!r})",
+        )
+
+    def _repr_html_(self) -> str:
+        return text.attempt(
+            lambda: html.html(tabulate.explained(self._told()), html.png(self._sketch)),
+            lambda: f"<pre>{escape(repr(self))}</pre>",
+        )
+
+    def _sketch(self, figure) -> None:
+        names = pictures.there(self.curves)[:SKETCHED]
+        figure.set_size_inches(9, 0.4 + 2.8 * -(-len(names) // 2))
+        pictures.draw(self.curves, names, pictures.grid(figure, len(names)))
+
+    def plot(self, *names: str, ax=None):
+        """Pictures of where the baseline errs, before and after, by matplotlib.
+
+        **Arguments:** `names`, by default the first six there are, of "where" (the mean residual
+        over the coordinate where its structure is strongest; "where 2" over the next), "force" and
+        "residual" over time, "friction", and "holdout", the residual of the held-out recording;
+        `ax`, matplotlib's axes to draw on, one for each name; a single one without a name gets the
+        first.
+
+        **Returns:** the axes, an array of as many as names; a single one for a single name or `ax`.
+
+        **Raises:** `ValueError` for a name there is not, or without matplotlib.
+        """
+        known = pictures.there(self.curves)
+        alone = ax is not None and np.ndim(ax) == 0
+        names = names or tuple(known[: 1 if alone else DRAWN])
+        if ax is None and len(names) != 1:
+            size = 9, 0.4 + 2.8 * -(-len(names) // 2)
+            panels = pictures.grid(drawing.figure(*size), len(names))
+        else:
+            panels = drawing.panels(ax, len(names), 4)
+        pictures.draw(self.curves, names, panels)
+        return panels[0] if alone or len(names) == 1 else panels
+
+    def _elsewhere(self) -> dict[str, Any]:
+        """The model of the held-out figures, where that is not the saved one."""
+        if self.holdout_model is None or not _adjusted(self.fit):
+            return {}
+        return {"holdout_model": self.holdout_model.to_dict()}
 
     @property
     def summary(self) -> str:
-        """The verdict in one sentence, with what the fit gains."""
-        text, error = VERDICTS[self.verdict], self.fit["force_error"]
-        if self.findings:
-            text += f" Force error {error['before']:.2%} before, {error['after']:.2%} after"
-            held = self.fit.get("holdout_force_error")
-            if held:
-                text += f"; on the held-out recording {held['before']:.2%} and {held['after']:.2%}"
-            text += "."
-        other, refitted = self.fit["holdout_force_error"], self.fit["holdout_refitted_error"]
-        if refitted is not None and other["before"] > ELSEWHERE * refitted:
-            text += (
-                f" But the held-out recording is left with {other['before']:.2%} of its force, and "
-                f"with {refitted:.2%} where the model is fitted to it: this recording does not "
-                "determine the values that hold there. Identify on one that moves like both."
-            )
-        return text
+        """The verdict in words: what is certain to be wrong first, then the force errors."""
+        severe = [each["text"] for each in self.warnings if each["severe"]]
+        other = [each["text"] for each in self.warnings if each["name"] == "not_better"]
+        verdict = DOUBTED if severe and not self.findings else VERDICTS[self.verdict]
+        said = [*severe, verdict, *other, _errors(self.fit, bool(self.findings))]
+        return " ".join([*said, *_not_determined(self.fit)])
+
+
+def _errors(fit: Mapping[str, Any], found: bool) -> str:
+    """The force errors, and what of them is noise."""
+
+    def said(error: Mapping[str, float]) -> str:
+        after = f" before, {error['after']:.2%} after" if found else ""
+        return f"{error['before']:.2%}{after}"
+
+    text = f"Force error {said(fit['force_error'])}"
+    if held := fit.get("holdout_force_error"):
+        text += f"; on the held-out recording{_adjusted(fit)} {said(held)}"
+    if (floor := fit.get("noise_floor")) is not None and math.isfinite(floor):
+        text += f"; {floor:.2%} is what noise alone makes"
+    return f"{text}.{_by_sample(fit)}"
+
+
+# A third of the force, a tenth of its power.
+LARGE = 0.3
+
+
+def _by_sample(fit: Mapping[str, Any]) -> str:
+    """That what a model predicts sample by sample is mostly the noise of the acceleration."""
+    if "filtered_force_error" not in fit:
+        return ""
+    whole, filtered = fit["force_error"]["after"], fit["filtered_force_error"]["after"]
+    if not whole > LARGE or filtered > 0.5 * whole:
+        return ""
+    return (
+        f" Sample by sample most of it is the noise of the acceleration: {filtered:.2%} is left "
+        "through a filter."
+    )
+
+
+def _adjusted(fit: Mapping[str, Any]) -> str:
+    """Which findings the held-out figures take otherwise than the saved model has them."""
+    adjusted = fit.get("holdout_adjusted") or {}
+    parts = [
+        f"{' and '.join(name.replace('_', ' ') for name in adjusted[key])} {how}"
+        for key, how in (("rephased", "at another phase"), ("left_out", "left out"))
+        if adjusted.get(key)
+    ]
+    return f" ({', '.join(parts)})" * bool(parts)
+
+
+def _not_determined(fit: Mapping[str, Any]) -> list[str]:
+    """That this recording does not determine the values that hold on the held-out one."""
+    refitted = fit.get("filtered_holdout_refitted_error")
+    if refitted is None or fit["filtered_holdout_force_error"]["after"] <= ELSEWHERE * refitted:
+        return []
+    return [
+        f"But the held-out recording is left with {fit['holdout_force_error']['after']:.2%} of "
+        f"its force, and with {fit['holdout_refitted_error']:.2%} where the model is fitted to it: "
+        "this recording does not determine the values that hold there. Identify on one that moves "
+        "like both."
+    ]
 
 
 # Other values of the same model leave less than half of a held-out recording's error, a quarter of
@@ -132,4 +251,5 @@ def _estimate(estimate: Estimate | Moved) -> dict[str, Any]:
     rest = {"standard_error": error if math.isfinite(error) else None, "unit": estimate.unit}
     if isinstance(estimate, Moved):
         return {"from": float(estimate.before), "to": float(estimate.value), **rest}
-    return {"value": float(estimate.value), **rest}
+    value = float(estimate.value)
+    return {"value": value if math.isfinite(value) else None, **rest}

@@ -3,31 +3,29 @@
 import dataclasses
 from collections.abc import Hashable, Iterator
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..identified import Identified
-from ..models import Model, named
-from ..recording import Recording
+from .. import checks
+from ..checks import Remark
+from ..data.recording import Recording, check_same_units, require, require_force
+from ..identification.identified import Identified
+from ..models import NAMED, Model, named
+from ..simulation.prediction import outliers, unseen
+from ..simulators import Known, same_motion
+from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
-from . import threads, verification
-from .baseline import Baseline, as_given, baseline_of, mismatch, simulated
+from . import parameters as spelled, threads, verification
+from .baseline import Baseline, as_given, at_values, baseline_of, mismatch, simulated
 from .candidates import OF_THE_MOMENT
-from .contest import contest
+from .contest import Contest, contest
+from .doubts import contradicted
 from .explained import Explanation
+from .figures import Figures, cast
 from .forward import motion_error
-from .naming import (
-    LATER_SHARE,
-    LEAST_OF_BASE,
-    LINEARITY,
-    MOST,
-    OF_BASE,
-    Named,
-    marks,
-    search,
-)
+from .improvement import improved
+from .naming import LATER_SHARE, LEAST_OF_BASE, LINEARITY, MOST, OF_BASE, Named, marks, search
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
@@ -51,8 +49,11 @@ def explain(
 
     - `recording`, and `holdout`, which is only judged on: signals of shape `(N,)`.
     - `baseline`: a model's name or a sum of terms, whose parameters are fitted; a model or an
-      identification, whose values are questioned first (`parameter_mismatch`); or a recording
-      of another simulator, of the same reference or the same motion.
+      identification, whose values are questioned first (`parameter_mismatch`); another
+      simulator's force along the recorded motion (`jf.simulators.Known`, any function from a
+      recording to it, `(N,)`, or a recording of the same motion), which stands as it is; or a
+      recording of the same reference run through another simulator, which a sum of terms is
+      fitted to.
     - `fixed`: values that are not found wrong stay as given, instead of being refitted.
     - `simulate`: run both models forward, from the recorded motion and by the recorded force, piece
       by piece, and compare the velocities (`fit["simulation_error"]`); takes some seconds more.
@@ -61,41 +62,158 @@ def explain(
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
     chance.
     """
+    require(recording, "explain")
+    require_force(recording, "explain")
+    if holdout is not None:
+        require(holdout, "explain (holdout)")
+        require_force(holdout, "explain (holdout)")
+    if isinstance(baseline, Recording):
+        require(baseline, "explain (baseline)")
+    for other in (holdout, baseline):
+        if isinstance(other, Recording):
+            check_same_units(recording, other)
+    recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
+    if not isinstance(baseline, Recording):
+        baseline_of(baseline)
+    figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
+    ours, remarks = inspected(recording)
+    theirs, more = (None, []) if holdout is None else inspected(holdout)
     # A few thousand rows: single precision would save nothing.
     with jax.enable_x64(True), threads.single():
-        ours, theirs = _double(recording), None if holdout is None else _double(holdout)
-        told = _explain(ours, _double(baseline), theirs, fixed, simulate, seed)
-    own = recording.time.dtype
-    models = {name: _double(getattr(told, name), own) for name in ("model", "baseline")}
-    return dataclasses.replace(told, **models)
+        held, remarks = None if theirs is None else cast(theirs), [*remarks, *more]
+        told = _explain(cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed)
+    models = {
+        name: None if model is None else _as_seen(figures.own(model), recording)
+        for name in ("model", "baseline", "holdout_model")
+        for model in (getattr(told, name),)
+    }
+    values = dict(told.baseline_parameters)
+    for name in unseen(values, recording):
+        values[name] = values[name]._replace(value=np.float64(np.nan))
+    return dataclasses.replace(told, **models, baseline_parameters=values)
 
 
-def _double(tree, dtype=float):
-    """Every floating-point array in double (or another) precision; anything else as it is."""
-
-    def cast(leaf):
-        inexact = eqx.is_array(leaf) and jnp.issubdtype(leaf.dtype, jnp.floating)
-        return jnp.asarray(np.asarray(leaf), dtype) if inexact else leaf
-
-    return tree if isinstance(tree, str) else jax.tree.map(cast, tree)
+def _as_seen(model: Model, recording: Recording) -> Model:
+    """The model without values of a direction in which the recording does not move."""
+    lacking = unseen(model.parameters, recording)
+    return model.with_parameters(dict.fromkeys(lacking, np.nan)) if lacking else model
 
 
-def _explain(recording, baseline, holdout, fixed: bool, simulate: bool, seed: int) -> Explanation:
+def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bool):
+    """The recordings with another simulator's force where the baseline stands on one, and the
+    baseline as a model of corrections to it, which stay zero unless they are found wrong.
+    """
+    if isinstance(baseline, Recording) and holdout is None and same_motion(recording, baseline):
+        baseline = Known(baseline.force)
+    if any(
+        baseline is make for make in NAMED.values()
+    ):  # the function that makes a model, not called
+        baseline = baseline()
+    if callable(baseline) and not isinstance(baseline, type | Model | Identified | AbstractTerm):
+        baseline = Known(baseline)
+    if isinstance(baseline, Known):
+        held = None if holdout is None else baseline.beside(holdout, held_out=True)
+        recording = baseline.beside(recording)
+        return recording, baseline.model(recording.units), held, True
+    given = baseline.model if isinstance(baseline, Identified) else baseline
+    term = given.term if isinstance(given, Model) else given
+    if isinstance(term, AbstractTerm) and KNOWN_FORCE in term.coordinates:
+        return recording, baseline, holdout, fixed
+    held = None if holdout is None else _alone(holdout)
+    return _alone(recording), baseline, held, fixed
+
+
+def _alone(recording: Recording) -> Recording:
+    """The recording without another simulator's force, which this baseline does not stand on."""
+    channels = {k: v for k, v in recording.channels.items() if k != KNOWN_FORCE}
+    return dataclasses.replace(recording, channels=channels)
+
+
+# What is said of lone samples in other words, as they are left out here.
+SPIKES = "force_spikes"
+
+
+def inspected(recording: Recording) -> tuple[Recording, list[Remark]]:
+    """A recording without samples that no actuator made, and what is to be said of it.
+
+    Every check of a recording by itself belongs here: where a remark is severe, nothing is named.
+    """
+    remarks = [remark for remark in checks.inspect(recording) if remark.name != SPIKES]
+    spikes = outliers(recording)
+    if not spikes.any():
+        return recording, remarks
+    mask = jnp.asarray(np.asarray(recording.mask) & ~spikes)
+    return dataclasses.replace(recording, mask=mask), [*remarks, _spikes(recording, spikes)]
+
+
+def _spikes(recording: Recording, lone: np.ndarray) -> Remark:
+    force = np.asarray(recording.force, float)
+    known = np.asarray(recording.mask) & np.isfinite(force)
+    share = float(np.sum(force[lone] ** 2) / np.sum(force[known] ** 2))
+    count, at = int(lone.sum()), float(np.asarray(recording.time)[np.argmax(lone)])
+    unit = recording.unit_names["force"]
+    which = f"one sample of the force, {force[np.argmax(lone)]:.3g} {unit} at t = {at:.6g} s, holds"
+    if count > 1:
+        which = f"{count} lone samples of the force, the first at t = {at:.6g} s, hold"
+    return Remark(
+        SPIKES,
+        f"{recording.source or 'The recording'}: {which} {share:.0%} of its power, which no "
+        "actuator does: left out. Look for a fault of the sensor, the bus or the file.",
+        False,
+    )
+
+
+def _explain(
+    recording, baseline, holdout, figures: Figures, remarks, fixed: bool, simulate: bool, seed: int
+) -> Explanation:
     known = _known(baseline, seed)
-    asked, found = _proved(recording, holdout, known.structure, seed)
-    found, rest = _with_the_force_put_back(recording, holdout, known.structure, asked, found, seed)
+    asked = ask(recording, holdout, known.structure)
+    remarks = [*remarks, *_contradictions(asked)]
     wrong = None
-    if known.model is not None:
-        wrong = mismatch(known.model, asked.base, asked.evidence, seed)
-        if wrong is None and fixed:
-            found = _as_given(known.model, found, asked)
-            rest = rest[0], _as_given(known.model, rest[1], rest[0])
-    explanation = tell(recording, asked, found, rest, known, wrong, seed)
+    if any(remark.severe for remark in remarks):
+        found = _nothing(asked)
+        rest = asked, found
+    else:
+        asked, found, rest = _found(recording, holdout, known, asked, seed)
+        there, left = rest
+        if known.model is not None:
+            wrong = mismatch(known.model, left.last, there.evidence, seed)
+        if known.model is not None and (wrong is not None or fixed):
+            free = () if wrong is None else tuple(wrong.moved)
+            found = _as_given(known.model, found, asked, free)
+            rest = there, _as_given(known.model, left, there, free)
+    first = found.base if wrong is None else at_values(known.model, asked.evidence)
+    better = improved(first, found, rest, asked, figures)
+    wrong = wrong if better.refitted else None
+    explanation = tell(recording, asked, better, known, wrong, figures, remarks, seed)
     if simulate:
         models = {"before": explanation.baseline, "after": explanation.model}
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
     return explanation
+
+
+def _contradictions(asked: Question) -> list[Remark]:
+    """What makes force and motion contradict each other, by the base alone."""
+    units = asked.evidence.motion.unit_names
+    remark = contradicted(asked, spelled.estimates(asked.base, asked.block, units)[0])
+    return [] if remark is None else [remark]
+
+
+def _nothing(asked: Question) -> Named:
+    """That nothing is named, nor looked for."""
+    for field in asked.fields:
+        field.close()
+    return Named(asked.base, asked.base, [], Contest([], [], float(len(asked.base.residual))))
+
+
+def _found(
+    recording, holdout, known: Baseline, asked: Question, seed: int
+) -> tuple[Question, Named, tuple[Question, Named]]:
+    """The findings, and the question where what they leave is judged, with the findings there."""
+    asked, found = _proved(recording, holdout, known.structure, seed, known=asked)
+    found, rest = _with_the_force_put_back(recording, holdout, known.structure, asked, found, seed)
+    return asked, found, rest
 
 
 def _with_the_force_put_back(
@@ -130,20 +248,23 @@ def _known(baseline, seed: int) -> Baseline:
     return baseline_of(baseline)
 
 
-def _as_given(model: Model, found: Named, asked: Question) -> Named:
-    """The findings beside the baseline's own values, which nothing on the recording contradicts."""
-    base, last = (as_given(model, now, asked.evidence) for now in (found.base, found.last))
-    return found._replace(base=base, last=last, given=model)
+def _as_given(model: Model, found: Named, asked: Question, free: tuple[int, ...]) -> Named:
+    """The findings beside the baseline's own values, but for those that the recording refutes."""
+    base, last = (as_given(model, now, asked.evidence, free) for now in (found.base, found.last))
+    return found._replace(base=base, last=last, given=model, free=free)
 
 
-def _proved(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
+def _proved(
+    recording, holdout, structure, seed, before=None, known: Question | None = None
+) -> tuple[Question, Named]:
     """The question and the findings that hold on the held-out recording.
 
     Where one did not, it may hold beside others that hardly show here; or another may account for
     the same here and hold there, another form of its law, which is looked for first, or another
-    effect. `before`: a question about the same motion.
+    effect. `before`: a question about the same motion; `known`: the question itself, if it has
+    been put.
     """
-    asked, first = pursue(recording, holdout, structure, seed, before)
+    asked, first = pursue(recording, holdout, structure, seed, before, known)
     _check_signals(first, recording, holdout)
     found = _verified(first, asked, seed)
     ways: list[tuple[frozenset[Hashable], float | None, float]]
@@ -182,9 +303,10 @@ def _check_signals(found: Named, recording, holdout) -> None:
     """Raise `ValueError` if a finding reads a signal that the held-out recording lacks."""
     if holdout is None:
         return
+    ours, theirs = _signals(recording), _signals(holdout)
     for taken in found.taken:
         candidate = taken.trial.candidate
-        lacking = (candidate.term.coordinates & set(recording.channels)) - set(holdout.channels)
+        lacking = (candidate.term.coordinates & ours) - theirs
         for signal in sorted(lacking):
             effect = candidate.effect.name.replace("_", " ")
             raise ValueError(
@@ -194,9 +316,17 @@ def _check_signals(found: Named, recording, holdout) -> None:
             )
 
 
-def pursue(recording, holdout, structure, seed, before=None) -> tuple[Question, Named]:
+def _signals(recording: Recording) -> set[str]:
+    """Beside the time, the velocity and the force, which every recording has or gets."""
+    placed = set() if recording.position is None else {"position"}
+    return placed | set(recording.channels)
+
+
+def pursue(
+    recording, holdout, structure, seed, before=None, known: Question | None = None
+) -> tuple[Question, Named]:
     """The question, put again if what was found changes how force and motion are aligned."""
-    asked = ask(recording, holdout, structure, before=before)
+    asked = known or ask(recording, holdout, structure, before=before)
     asked, found = _searched(recording, holdout, asked, seed)
     if found.taken:
         again = ask(recording, holdout, structure, found.last, asked)
@@ -292,8 +422,8 @@ def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -
     """Whether what `less` lacks helps on the held-out recording; beside others, by how much."""
     if not verification.helps(less, found.last, asked.held, rephased):
         return False
-    gained, target = less.energy - found.last.energy, asked.evidence.target
-    faint = gained < LINEARITY**2 * float(target @ target)
+    gained, force = less.energy - found.last.energy, asked.evidence.force
+    faint = gained < LINEARITY**2 * float(force @ force)
     if len(found.taken) == 1 and not faint:
         return True
 

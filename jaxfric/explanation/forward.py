@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
+from ..data.recording import Recording
 from ..models import Model
-from ..recording import Recording
-from ..simulation import simulate
+from ..simulation.simulating import simulate
 from ..terms.base import summands
 from ..terms.presliding import AbstractMemory
 from .question import from_position

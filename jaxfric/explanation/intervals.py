@@ -9,7 +9,7 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
     """Covariance of all parameters, affine ones first, `(P, P)`; infinite where not visible.
 
     The sandwich of block scores, each block freed of its own pull on the fit: the delete-one-block
-    jackknife (CR3 of Bell & McCaffrey 2002), as in [`jaxfric.uncertainty`][].
+    jackknife (CR3 of Bell & McCaffrey 2002), as in [`jaxfric.identification.uncertainty`][].
 
     **Arguments:** `block`, the number of each row's block, `(J,)`.
     """

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from ..catalogue import Effect
 from ..models import Model
 from ..terms import Compliance, DryCompliance, ElasticBacklash
+from ..terms.catalogue import Effect
 from .candidates import OF_THE_MOMENT, Candidate, Field
 from .chance import DRAWS, LEVEL
 from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
@@ -54,7 +54,8 @@ class Named(NamedTuple):
     `base` and `last`: the fits before and after; `taken`, in the order of discovery; `left`, the
     contest for what remains; `smoothed`: what kernel and sampling make of the time by which the
     force is late, where it is, s; `start`: what rows without reversals had shown, where these reach
-    across them; `given`: the base with its own values, where these are kept.
+    across them; `given`: the base with its own values, where these are kept, but for `free`,
+    numbers of its parameters.
     """
 
     base: Fit
@@ -64,6 +65,7 @@ class Named(NamedTuple):
     smoothed: float = 0.0
     start: "Named | None" = None
     given: Model | None = None
+    free: tuple[int, ...] = ()
 
     @property
     def names(self) -> frozenset[str]:
@@ -229,7 +231,7 @@ def _believed(
     round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken], judged, part: float
 ):
     least = LATER_SHARE if taken else LEAST_SHARE
-    force = float(evidence.target @ evidence.target)
+    force = float(evidence.force @ evidence.force)
     before = [t.trial.candidate.effect for t in taken]
     for finalist in round_.finalists:
         gained = now.energy - finalist.energy

@@ -6,10 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import programs
-from ..effects import Wave, wave
+from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
-from ..uncertainty import Estimate
+from ..terms.effects import Wave, wave
 from ..units import spell
 from .intervals import covariance
 from .regression import Fit

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..terms import ActuatorDeadband
+from ..terms import KNOWN_FORCE, ActuatorDeadband
 from .evidence import NODES, PAIR, Evidence, evaluate
 from .regression import Fit
 
@@ -25,6 +25,8 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving)[0]
     force = force + rate(evidence, momentum)
+    if KNOWN_FORCE in evidence.motion.channels:
+        force = force + np.asarray(evidence.motion.channels[KNOWN_FORCE])
     if any(isinstance(term, ActuatorDeadband) for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(

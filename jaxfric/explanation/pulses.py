@@ -5,7 +5,7 @@ from math import comb
 import numpy as np
 
 from .. import terms as laws
-from ..effects import EFFECTS
+from ..terms.effects import EFFECTS
 from .candidates import Candidate
 from .chance import LEVEL
 from .evidence import Evidence

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import terms as laws
-from ..recording import Recording
+from ..data.recording import Recording
 from ..terms.base import AbstractTerm
 from .candidates import Field
 from .chance import blocks

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import jax.numpy as jnp
 import numpy as np
 
+from ..data.recording import Recording
 from ..models import Model
-from ..recording import Recording
 from .chance import DRAWS
 from .evidence import Evidence, lengthened
 from .regression import Fit

@@ -2,7 +2,7 @@
 
 import math
 
-from ..uncertainty import Estimate
+from ..identification.uncertainty import Estimate
 
 
 def quantity(estimate: Estimate, scale: float = 1.0) -> str:
@@ -98,10 +98,14 @@ def _words(name: str, estimate: Estimate) -> str:
 
 def mismatch_sentence(moved, share: float) -> str:
     """Wrong values of the baseline as a sentence."""
-    parts = [
-        f"{name} is {quantity(Estimate(m.value, m.standard_error, m.unit))}, not {m.before:.4g}"
-        for name, m in moved.items()
-    ]
+    parts = []
+    for name, m in moved.items():
+        if m.before:
+            value = quantity(Estimate(m.value, m.standard_error, m.unit))
+            parts.append(f"{name} is {value}, not {m.before:.4g}")
+        else:
+            value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
+            parts.append(f"{name} is {value} {'more' if m.value > 0 else 'less'}")
     return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
 
 

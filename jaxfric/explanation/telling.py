@@ -1,20 +1,25 @@
 """What was found, told: findings with their parameters and sentences, the verdict, the errors."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..effects import EFFECTS
-from ..recording import Recording
-from ..uncertainty import Estimate
+from ..checks import Remark
+from ..data.recording import Recording
+from ..identification.uncertainty import Estimate
+from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
-from .baseline import Baseline, Mismatch, at_values
+from .baseline import Baseline, Mismatch
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
 from .curves import curves, unit
+from .doubts import NOT_BETTER, accelerates, doubts, not_better
+from .errors import document, filtered_errors
 from .evidence import Evidence
-from .explained import Explanation, Finding, Moved
+from .explained import ELSEWHERE, Explanation, Finding, Moved
+from .figures import Figures
+from .improvement import Improved, elsewhere
 from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .predictions import with_predictions
@@ -27,56 +32,124 @@ from .views import estimated
 def tell(
     recording: Recording,
     asked: Question,
-    found: Named,
-    rest: tuple[Question, Named],
+    better: Improved,
     known: Baseline,
     wrong: Mismatch | None,
+    figures: Figures,
+    remarks: Sequence[Remark] = (),
     seed: int = 0,
 ) -> Explanation:
     """The explanation of a recording from all that was found about it.
 
-    `rest`: where what the findings leave is judged, the question and the findings themselves; where
-    the force acts late, on the recording with the force put back.
+    **Arguments:** `better`: the baseline and the findings with which the model is better; `known`:
+    the baseline as it was given, and `wrong`, which of its values are; `figures`: the force errors
+    of models; `remarks`: what was said about the recording before.
     """
     units, evidence = recording.unit_names, asked.evidence
-    first = found.base if wrong is None else at_values(known.model, evidence)
-    force = float(np.sqrt(np.mean(evidence.target**2)))
-    before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
-    before = _through_wide(before, first, asked.wide, seed)
-    before = _lasting(before, first, asked)
-    after = []
-    if found.taken or wrong is not None:
-        where, left = rest
-        seen = with_predictions(where.evidence, left.last)
-        after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
-        after = _through_wide(after, left.last, where.wide, seed)
-        after = _lasting(after, left.last, where)
+    first, found, rest = better.first, better.found, better.rest
+    before, after = _places(asked, better, wrong, seed)
     findings = _findings(found, asked, rest, first)
     standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
-    values = spelled.estimates(found.base, asked.block, units)[0]
+    values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
     drawn = curves(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
-    errors = _errors(asked, first, *rest)
+    filtered = filtered_errors(asked, first, *rest)
+    if not any(remark.severe for remark in remarks):
+        remarks = [*remarks, *_doubts(asked, better, units)]
+    verdict = _verdict(findings, before, after, _rough(filtered, shares), standing)
+    errors = document(asked, better, filtered, models[1], figures)
+    remarks = [*remarks, *_elsewhere(errors)]
     return Explanation(
-        verdict=_verdict(findings, before, after, _rough(errors, shares), standing),
+        verdict=_doubted(verdict, remarks),
         where=_everywhere([_where(place, units) for place in before], findings, first),
         findings=sorted(findings, key=lambda finding: -finding.share),
         fit=errors,
-        not_visible=_not_visible(found, units),
+        not_visible=_not_visible(found, units, better.gone),
         model=models[1],
         baseline=models[0],
         baseline_name=known.name,
         baseline_parameters=values,
         recording=_facts(recording),
         curves=drawn,
+        warnings=[remark.to_dict() for remark in remarks],
+        holdout_model=None if asked.held is None else elsewhere(found, rest, recording.units),
     )
+
+
+def _places(asked: Question, better: Improved, wrong: Mismatch | None, seed: int):
+    """Where the baseline's residual has structure, and where that of the findings has."""
+    first, evidence = better.first, asked.evidence
+    force = float(np.sqrt(np.mean(evidence.force**2)))
+    before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
+    before = _through_wide(before, first, asked.wide, seed)
+    before = _lasting(before, first, asked)
+    if not better.found.taken and wrong is None:
+        return before, []
+    where, left = better.rest
+    seen = with_predictions(where.evidence, left.last)
+    after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
+    after = _through_wide(after, left.last, where.wide, seed)
+    return before, _lasting(after, left.last, where)
+
+
+def _doubts(asked: Question, better: Improved, units) -> list[Remark]:
+    """What makes the model that is reported doubtful, and what was not reported for its errors."""
+    where, left = better.rest
+    values = spelled.estimates(left.last, where.block, units)[0]
+    if accelerates(values):  # with what other views say of it
+        values = estimated(better.found, asked, better.rest)[0]
+    remarks = doubts(left.last, where, values, better.after.filtered)
+    if better.spoilt is not None:
+        remark = not_better(better.gone, better.before, better.spoilt)
+        if FILTERED & set(better.gone) and asked.evidence.motion.position is None:
+            remark = remark._replace(text=f"{remark.text} {NO_POSITION}")
+        remarks.append(remark)
+    return remarks
+
+
+def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
+    """That the held-out recording obeys other values of the same model."""
+    held, refitted = (
+        errors["filtered_holdout_force_error"],
+        errors["filtered_holdout_refitted_error"],
+    )
+    if refitted is None or not held["after"] > ELSEWHERE * refitted:
+        return []
+    text = (
+        f"The held-out recording is left with {held['after']:.0%} of its force, and with "
+        f"{refitted:.0%} where the model is fitted to it: it is of another axis, in other units or "
+        "of another sign, or this recording does not determine the values that hold there."
+    )
+    return [Remark("holdout_differs", text, False)]
+
+
+def _doubted(verdict: str, remarks: Sequence[Remark]) -> str:
+    """A verdict that says no more than the remarks allow."""
+    names = {remark.name for remark in remarks}
+    doubtful = any(remark.severe for remark in remarks)
+    if verdict == "explained" and doubtful:
+        return "partly_explained"
+    return (
+        "unexplained" if verdict == "consistent" and (doubtful or NOT_BETTER in names) else verdict
+    )
+
+
+def _freed(now: Fit, wrong: Mismatch | None) -> Fit:
+    """A fit of whose base only the wrong values were fitted; what stayed has no error."""
+    if wrong is None:
+        return now
+    columns, slopes = now.columns.copy(), now.slopes.copy()
+    count, searched = len(now.alphas[0]), len(now.betas[0])
+    columns[:, [i for i in range(count) if i not in wrong.moved]] = 0.0
+    slopes[:, [i for i in range(searched) if count + i not in wrong.moved]] = 0.0
+    return now._replace(columns=columns, slopes=slopes)
 
 
 def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -> Finding:
@@ -191,6 +264,10 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
 
 # What a filter on the recorded velocity cannot be told from.
 FILTERED = frozenset({"transport_delay", "actuator_lag"})
+NO_POSITION = (
+    "No position is recorded: a filter on the recorded velocity looks like a delay or a lag, and "
+    "recording the position tells."
+)
 
 
 def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
@@ -210,10 +287,7 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
                 "phase: the position's zero has moved, as after another homing."
             )
         if effect.name in FILTERED and asked.evidence.motion.position is None:
-            text += (
-                " No position is recorded: a filter on the recorded velocity looks the same, and "
-                "recording the position tells."
-            )
+            text += f" {NO_POSITION}"
         findings.append(
             Finding(
                 effect.name,
@@ -305,34 +379,12 @@ def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
     }
 
 
-def _errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[str, Any]:
-    def pair(before, after, rephased=frozenset()):
-        return {
-            "before": verification.error(first, before),
-            "after": verification.error(left.last, after, rephased),
-        }
-
-    held = refitted = None
-    if asked.held is not None:
-        held = pair(asked.held, where.held, left.rephased)
-        if not left.taken:
-            seen = with_predictions(asked.held, first)
-            refitted = verification.error(fit(first.terms, seen, first.betas), asked.held)
-    return {
-        "force_error": pair(asked.evidence, where.evidence),
-        "holdout_force_error": held,
-        "holdout_refitted_error": refitted,
-        "simulation_error": None,
-        "noise_floor": verification.noise(left.last, where.evidence.target),
-    }
-
-
-def _not_visible(found: Named, units) -> list[dict[str, Any]]:
+def _not_visible(found: Named, units, gone: Sequence[str]) -> list[dict[str, Any]]:
     sizes = verification.smallest_visible(found.left, found.last)
     return [
         {"effect": effect, "smallest_detectable": float(size), "unit": units["force"]}
         for effect, size in sorted(sizes.items(), key=lambda item: item[1])
-        if effect not in found.names
+        if effect not in found.names and effect not in gone
     ]
 
 

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import terms as laws
-from ..effects import EFFECTS
-from ..recording import Recording
+from ..data.recording import Recording
+from ..terms.effects import EFFECTS
 from .candidates import Candidate
 from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial

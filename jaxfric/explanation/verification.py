@@ -29,8 +29,15 @@ def residual(
     their amplitude but find their phase anew: the zero of an incremental encoder is another after
     each homing, and that of the clock in each recording.
     """
+    return _there(now, evidence, rephased, skipped)[0]
+
+
+def _there(
+    now: Fit, evidence: Evidence, rephased: frozenset[int], skipped: frozenset[int]
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """The [`residual`][] on a recording, and the affine parameters of each term there."""
     seen = with_predictions(evidence, now)
-    left, waves = evidence.target.copy(), []
+    left, waves, alphas = evidence.target.copy(), [], list(now.alphas)
     for number, (term, beta, alpha) in enumerate(
         zip(now.terms, now.betas, now.alphas, strict=True)
     ):
@@ -38,15 +45,18 @@ def residual(
             continue
         columns = seen.columns(term, beta[None])[0]
         if number in rephased:
-            waves.append((columns, alpha))
+            waves.append((number, columns))
         else:
             left -= columns @ alpha
-    for columns, alpha in waves:
+    for number, columns in waves:
+        alpha = np.array(alphas[number])
         for i in range(0, len(alpha), 2):
             free = np.linalg.lstsq(columns[:, i : i + 2], left, rcond=None)[0]
             size = np.hypot(*alpha[i : i + 2]) / max(float(np.hypot(*free)), 1e-300)
-            left = left - columns[:, i : i + 2] @ (free * size)
-    return left
+            alpha[i : i + 2] = free * size
+            left = left - columns[:, i : i + 2] @ alpha[i : i + 2]
+        alphas[number] = alpha
+    return left, alphas
 
 
 def wavelike(now: Fit, number: int) -> bool:
@@ -69,20 +79,37 @@ def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) 
     Found terms that time alone drives count where they return, and not where they do not; tones may
     return at another phase.
     """
-    moments = [i for i, t in enumerate(now.terms) if i and isinstance(t, _MOMENTARY)]
-    lefts = [residual(now, evidence, rephased)]
+    power = min(float(left @ left) for left, _, _ in _ways(now, evidence, rephased))
+    return float(np.sqrt(power / max(evidence.force @ evidence.force, 1e-300)))
+
+
+def carried(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> Fit:
+    """A fit as it stands on another recording, by the way in which [`error`][] is taken there.
+
+    Without what belongs to a moment that does not return, waves at their phase there; what else
+    it holds is still of the recording that it was fitted to.
+    """
+    ways = _ways(now, evidence, rephased)
+    _, alphas, skipped = min(ways, key=lambda way: float(way[0] @ way[0]))
+    other = now._replace(alphas=tuple(alphas))
+    return other.only([i for i in range(len(now.terms)) if i not in skipped]) if skipped else other
+
+
+def _ways(now: Fit, evidence: Evidence, rephased: frozenset[int]):
+    """Residual, affine parameters and terms left out, for each way in which moments may return."""
+    moments = frozenset(i for i, t in enumerate(now.terms) if i and isinstance(t, _MOMENTARY))
+    ways = [(rephased, frozenset[int]())]
     if moments:
-        lefts.append(residual(now, evidence, rephased, frozenset(moments)))
+        ways.append((rephased, moments))
     if tones := _tones(now):
-        lefts.append(residual(now, evidence, rephased | tones, frozenset(moments) - tones))
-    power = min(float(left @ left) for left in lefts)
-    return float(np.sqrt(power / max(evidence.target @ evidence.target, 1e-300)))
+        ways.append((rephased | tones, moments - tones))
+    return [(*_there(now, evidence, anew, skipped), skipped) for anew, skipped in ways]
 
 
 def lacking(named: Named, evidence: Evidence, number: int) -> Fit:
     """The model refitted without the found term of that number; the base where it is not kept."""
     less = without(named.last, evidence, len(named.last.terms) - len(named.taken) + number)
-    return less if named.given is None else as_given(named.given, less, evidence)
+    return less if named.given is None else as_given(named.given, less, evidence, named.free)
 
 
 def share(

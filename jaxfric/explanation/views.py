@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..uncertainty import Estimate
+from ..identification.uncertainty import Estimate
 from . import parameters as spelled, verification
 from .evidence import Evidence
 from .naming import Named

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import terms as laws
+from ..data.recording import Recording
 from ..models import Model
-from ..recording import Recording
 from ..terms.base import AbstractTerm
 from ..terms.presliding import AbstractMemory
 from ..terms.time import AbstractModulated
@@ -188,9 +188,12 @@ def fit(velocity: np.ndarray, friction: np.ndarray, weight: np.ndarray) -> tuple
     """The level F ≥ 0 and slope D ≥ 0 of F sign(v) + D v nearest to a friction curve.
 
     Least squares with the given weights, all `(N,)`.
+
+    **Raises:** `ValueError` for numbers that are too large.
     """
     columns = np.stack([np.sign(velocity), velocity], axis=1)
     root = np.sqrt(weight)
+    _check_range(weight, velocity, friction)
     best, least = (0.0, 0.0), float(np.sum(weight * friction**2))
     for kept in ([0, 1], [0], [1]):
         found, *_ = np.linalg.lstsq(columns[:, kept] * root[:, None], friction * root)
@@ -206,9 +209,21 @@ def error(
 ) -> ForceError:
     """The cost of giving one force, `(N,)`, for another; `bursts` adds to the worst case."""
     left = wanted - given
+    _check_range(where.weight, wanted, left)
     rms, size = where.rms(left), where.rms(wanted)
     relative = rms / size if size > 0 else 0.0
     return ForceError(rms, relative, float(np.max(np.abs(left))) + bursts, unit)
+
+
+def _check_range(weight: np.ndarray, *forces: np.ndarray) -> None:
+    """Raise `ValueError` where the ranges reach so far that no sum of squares can be formed."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        fine = all(np.isfinite(np.sum(weight * force**2)) for force in forces)
+    if not fine:
+        raise ValueError(
+            "Over this range the model's force is not finite, or too large to be squared: give a "
+            "range that the machine reaches (--speed, --position)."
+        )
 
 
 def burst(model: Model, part: Part) -> float:

@@ -2,8 +2,10 @@
 
 import re
 
-from ..models import Model
-from . import c, modelica, mujoco, table, urdf
+import numpy as np
+
+from ..models import Model, require
+from . import c, cost, modelica, mujoco, table, urdf
 from .cost import Range
 from .outcome import Exported
 
@@ -30,6 +32,31 @@ def export(
     leave such terms out instead and count them), a range that is none, or a model that is not
     fully identified. Not to be used inside jit: the result is text.
     """
+    require(model, "export")
+    found = _written(model, target, name, speed, position)
+    return found._replace(remarks=(*driven(model), *found.remarks))
+
+
+def driven(model: Model) -> tuple[str, ...]:
+    """What no passive axis does: an inertia below zero, friction that drives instead of braking.
+
+    Half the difference of the friction forward and backward counts: a constant load cancels.
+    """
+    remarks = []
+    inertia = model.parameters.get("inertia")
+    if inertia is not None and float(inertia) < 0:
+        remarks.append(f"Warning: the inertia is negative, {float(inertia):.4g}.")
+    speeds = np.linspace(0, 1, 129)[1:] * cost.speed_range(model)[1]
+    both = np.asarray(model.friction(np.concatenate([speeds, -speeds])))
+    if np.min(0.5 * (both[:128] - both[128:])) < 0:
+        remarks.append(
+            "Warning: at some speeds the friction is negative and drives the axis: feed-forward "
+            "with it is unsafe. Was the force's sign right, and the identification successful?"
+        )
+    return tuple(remarks)
+
+
+def _written(model: Model, target: str, name: str, speed, position) -> Exported:
     if target in _RANGED:
         if not re.fullmatch(r"\w+([.-]\w+)*", name):
             raise ValueError(

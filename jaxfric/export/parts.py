@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import terms as laws
-from ..effects import effect_of
 from ..models import Model
 from ..terms.base import AbstractTerm, summands
+from ..terms.effects import effect_of
 from ..terms.presliding import AbstractMemory
 from ..terms.time import AbstractModulated
 from ..units import spell
@@ -78,7 +78,10 @@ def parts(model: Model) -> tuple[Part, ...]:
         raise ValueError("A batch of models cannot be exported: hand over one of its rows.")
     bad = [name for name, value in model.parameters.items() if not np.isfinite(float(value))]
     if bad:
-        raise ValueError(f"There is no value for {', '.join(bad)}: the model was not identified.")
+        raise ValueError(
+            f"There is no value for {', '.join(bad)}: the recording that the model was identified "
+            "from does not show it. Record motion in both directions, and identify anew."
+        )
     affine = [p.name for p in model.term.affine]
     nonlinear = [p.name for p in model.term.nonlinear]
     return tuple(

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import terms as laws
+from ..data.recording import Recording
 from ..models import Model
-from ..recording import Recording
 from ..units import VELOCITY, spell
 from . import cost
 from .cost import Range

@@ -7,11 +7,11 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
-from .. import devices, documents
-from ..identification import LEAST_COVERED
-from ..identified import Identified
-from ..projections import AbstractProjection, ClosedWindows, WeakForm
-from ..question import ask
+from ..identification import devices, documents
+from ..identification.identified import Identified
+from ..identification.identifying import LEAST_COVERED
+from ..identification.projections import AbstractProjection, ClosedWindows, WeakForm
+from ..identification.question import ask
 from .journal import Row
 from .reading import Item
 
@@ -76,7 +76,8 @@ class Batches:
             projection = WeakForm(width)
         try:
             question = ask(self._model, batch, projection, self._bounds, width=width)
-            found = devices.solve(question, self._over)
+            faults = np.stack([item.faults for item in filled])
+            found = devices.solve(question, faults, self._over)
         except ValueError as error:  # too short for the kernel
             yield from ((item, failed(item, f"{item.file.path}: {error}")) for item in items)
             return
@@ -94,12 +95,14 @@ def row(found: Identified, item: Item) -> Row:
     document = documents.identification(found, item.recording)
     facts = {name: item.facts[name] for name in ("samples", "duration", "sample_rate")}
     kept = ("result", "projection", "windows", "covered", "force_error")
-    fine = document["result"] == "successful" and bool(found.describes)
-    reason = "" if fine else document["diagnosis"]
+    reason = "" if document["result"] == "successful" else document["diagnosis"]
+    named = ", ".join(warning["name"] for warning in document["warnings"])
     circumstances = facts | {name: document[name] for name in kept}
     notes = " ".join(item.facts["notes"])
     return _finite(
-        circumstances | {"reason": reason, "notes": notes, "parameters": document["parameters"]}
+        circumstances
+        | {"reason": reason, "warnings": named, "notes": notes}
+        | {"parameters": document["parameters"]}
     )
 
 

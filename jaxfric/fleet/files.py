@@ -4,15 +4,19 @@ import datetime
 import glob
 import os
 import re
-from collections.abc import Sequence
+from collections import deque
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote
+
+from .expressions import expression
 
 # Keys of a partitioned dataset (`machine=7/axis=x/date=2024-03-01/log.parquet`) that say when
 # instead of what.
 TIMES = ("date", "day", "month", "year", "hour", "time", "timestamp", "week", "run", "session")
 SUFFIXES = (".csv", ".parquet", ".mat", ".npz")
+_STARS = re.compile(r"(?:^|(?<=[/\\]))\*\*(?:[/\\]|$)" if os.altsep else r"(?:^|(?<=/))\*\*(?:/|$)")
 _KEY = re.compile(r"^([A-Za-z_]\w*)=(.+)$")
 _DATE = re.compile(
     r"(?<!\d)((?:19|20)\d\d)([-_]?)(0[1-9]|1[0-2])\2(0[1-9]|[12]\d|3[01])(?!\d)"
@@ -60,10 +64,11 @@ def find(
 
     **Raises:** `ValueError` if a pattern matches no file, or `axis` or `group` none of the files.
     """
-    paths: dict[str, None] = {}
+    paths: dict[str, str] = {}
     for pattern in patterns:
-        paths |= dict.fromkeys(_matching(pattern))
-    ordered = sorted(paths, key=_natural)
+        for path in _matching(pattern):
+            paths.setdefault(_place(path), path)
+    ordered = sorted(paths.values(), key=_natural)
     keys = [_keys(path) for path in ordered]
     axes = [_axis(k) for k in keys] if axis is None else _names(ordered, keys, axis, "--axis")
     groups = [""] * len(keys) if group is None else _names(ordered, keys, group, "--group")
@@ -76,7 +81,7 @@ def _matching(pattern: str) -> list[str]:
     if os.path.isfile(pattern):
         return [pattern]
     folder = os.path.isdir(pattern)
-    found = glob.glob(os.path.join(pattern, "**", "*") if folder else pattern, recursive=True)
+    found = _found(os.path.join(glob.escape(pattern), "**", "*") if folder else pattern)
     found = [path for path in found if os.path.isfile(path)]
     if folder:
         found = [path for path in found if path.lower().endswith(SUFFIXES)]
@@ -84,6 +89,44 @@ def _matching(pattern: str) -> list[str]:
         hint = "" if folder else "; quote a pattern, so that ** reaches jaxfric and not the shell"
         raise ValueError(f"{pattern}: no file matches{hint}.")
     return found
+
+
+def _place(path: str) -> str:
+    """What is one for all names of a file through linked folders."""
+    folder, name = os.path.split(path)
+    return os.path.join(os.path.realpath(folder), name)
+
+
+def _found(pattern: str) -> list[str]:
+    """What a glob matches; its first `**` enters each folder once, wherever links lead."""
+    parts = _STARS.split(pattern, maxsplit=1)
+    if len(parts) == 1:
+        return glob.glob(pattern)
+    head, tail = parts
+    starts = glob.glob(head) if head else [""]
+    folders = (folder for start in starts for folder in _folders(start))
+    return [path for f in folders for path in _found(os.path.join(glob.escape(f), tail or "*"))]
+
+
+def _folders(start: str) -> Iterator[str]:
+    """A folder and all in it, each once: first those that it holds, then those it has links to."""
+    seen: set[str] = set()
+    held, linked = deque([start]), deque[str]()
+    while held or linked:
+        folder = held.popleft() if held else linked.popleft()
+        real = os.path.realpath(folder)
+        if real in seen or not os.path.isdir(real):
+            continue
+        seen.add(real)
+        yield folder
+        try:
+            entries = sorted(os.scandir(folder or os.curdir), key=lambda entry: entry.name)
+        except OSError:  # not ours to look into
+            continue
+        for entry in entries:
+            if not entry.name.startswith("."):
+                path = os.path.join(folder, entry.name)
+                (linked if entry.is_symlink() else held).append(path)
 
 
 def _natural(text: str) -> tuple:
@@ -109,10 +152,7 @@ def _names(paths, keys, how: str, option: str) -> list[str]:
     """What a key or a regular expression takes from each path; empty where it takes nothing."""
     if any(how in k for k in keys):
         return [k.get(how, "") for k in keys]
-    try:
-        pattern = re.compile(how)
-    except re.error as error:
-        raise ValueError(f"{option} {how}: this is no regular expression: {error}.") from error
+    pattern = expression(how, option)
     found = [pattern.search(path) for path in paths]
     names = ["" if m is None else "/".join(filter(None, m.groups())) or m[0] for m in found]
     if not any(names):

@@ -34,8 +34,10 @@ def forget(out: str | os.PathLike, part: int = 0, parts: int = 1) -> None:
     **Raises:** `ValueError` if another run is writing to them.
     """
     for path in sorted(folder(out).glob("rows-*.jsonl")):
-        number = int(path.stem.removeprefix("rows-"))
-        if number == part or (part == 0 and number >= parts):
+        number = path.stem.removeprefix("rows-")
+        if not number.isdecimal():
+            continue
+        if int(number) == part or (part == 0 and int(number) >= parts):
             with path.open("ab") as file:
                 _lock(file, path)
             path.unlink()
@@ -103,7 +105,7 @@ class Journal:
         for path in sorted(self.folder.glob("rows-*.jsonl")):
             for line in _lines(path)[1:]:
                 file = wanted.get(line["file"])
-                if file and (file.size, file.changed) == (line["size"], line["changed"]):
+                if file and (file.size, file.changed) == (line.get("size"), line.get("changed")):
                     found[file.path] = line["row"]
         return found
 
@@ -129,9 +131,9 @@ class Journal:
         self._file.seek(0, os.SEEK_END)
 
     def _append(self, lines: Iterable[Mapping[str, Any]]) -> None:
-        text = "".join(json.dumps(line, ensure_ascii=False) + "\n" for line in lines)
+        text = "".join(json.dumps(line) + "\n" for line in lines)
         try:
-            self._file.write(text.encode("utf-8"))
+            self._file.write(text.encode("ascii"))
             self._file.flush()
             os.fsync(self._file.fileno())
         except OSError as error:
@@ -139,8 +141,30 @@ class Journal:
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:
+    """What a journal holds; raises `ValueError` for a line that no fleet has written."""
     content = path.read_bytes()
-    return [json.loads(line) for line in content[: content.rfind(b"\n") + 1].splitlines()]
+    whole = content[: content.rfind(b"\n") + 1].split(b"\n")[:-1]
+    return [_line(path, number, line) for number, line in enumerate(whole, 1)]
+
+
+def _line(path: Path, number: int, text: bytes) -> dict[str, Any]:
+    wanted = {"schema": str, "task": dict} if number == 1 else {"file": str, "row": dict}
+    try:
+        found = json.loads(text)
+        right = all(isinstance(found[key], kind) for key, kind in wanted.items())
+        right = right and (number == 1 or _is_row(found["row"]))
+    except (ValueError, RecursionError, TypeError, KeyError):
+        right = False
+    if not right:
+        raise ValueError(
+            f"{path}: line {number} was not written by jaxfric fleet, or is damaged. Remove the "
+            "line, or give --restart to begin anew."
+        )
+    return found
+
+
+def _is_row(row: Row) -> bool:
+    return isinstance(row.get("result"), str) and isinstance(row.get("parameters"), dict)
 
 
 def _plain(value: Any) -> Any:
@@ -148,7 +172,7 @@ def _plain(value: Any) -> Any:
 
 
 def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
-    if theirs.get("schema") != SCHEMA or theirs["jaxfric"] != ours["jaxfric"]:
+    if theirs["schema"] != SCHEMA or theirs.get("jaxfric") != ours["jaxfric"]:
         return f"another version of jaxfric ({theirs.get('jaxfric')})"
     pairs = ((name, theirs["task"].get(name), value) for name, value in ours["task"].items())
     return ", ".join(f"{name} {old}, not {new}" for name, old, new in pairs if old != new)

@@ -10,15 +10,16 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from .. import documents
-from ..io import read_with_notes
-from ..recording import Recording, uniform
+from .. import checks
+from ..data import summary
+from ..data.io import read_with_notes
+from ..data.recording import Recording, uniform
 from ..signals import kernel_half_width, prepare
 from .files import File
 
 
 class Item(NamedTuple):
-    """A recording that waits for its batch, and its half-width of the weak form's kernel.
+    """A recording that waits for its batch, its half-width of the weak form's kernel, its faults.
 
     Its velocity and the half-width are those that it would have alone, so that its result does not
     depend on its batch.
@@ -28,6 +29,7 @@ class Item(NamedTuple):
     facts: dict[str, Any]
     recording: Recording
     width: int
+    faults: np.ndarray
 
     @property
     def kind(self) -> tuple:
@@ -65,11 +67,15 @@ def ahead(
 def _ready(file: File, how: Mapping[str, Any]) -> Item | Failure:
     try:
         recording, notes = read_with_notes(file.path, **how)
-        facts = documents.recording_facts(recording, notes)
+        facts = summary.facts(recording, notes)
         # The named models know velocity only: other channels need not be carried along.
-        ready = prepare(uniform(dataclasses.replace(recording, channels={})))
-        return Item(file, facts, jax.tree.map(np.asarray, ready), kernel_half_width(ready))
+        log = uniform(dataclasses.replace(recording, channels={}))
+        ready = prepare(log)
+        width, faults = kernel_half_width(ready), checks.recorded(log)
+        return Item(file, facts, jax.tree.map(np.asarray, ready), width, faults)
     except (ValueError, OSError) as error:
         return Failure(file, str(error))
     except MemoryError:
         return Failure(file, f"{file.path}: out of memory; split the file.")
+    except Exception as error:  # a fleet of thousands outlives any one of them
+        return Failure(file, f"{file.path}: {type(error).__name__}: {error}")

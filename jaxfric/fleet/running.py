@@ -2,12 +2,13 @@
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 
-from .. import devices, models
-from ..tables import optional
+from .. import models
+from ..data.tables import optional
+from ..identification import devices
 from .batches import Batches, failed
 from .files import File
 from .journal import Journal, Row
@@ -18,7 +19,7 @@ class Options(NamedTuple):
     """All that the rows of a fleet depend on, beside its files.
 
     `model`, a name; `projection`, "auto", "closed-windows" or "weak-form"; `bounds` of nonlinear
-    parameters; `columns`, `scale` and `units` as [`jaxfric.read`][] takes them.
+    parameters; `columns`, `scale`, `units`, `period` and `repair` as [`jaxfric.read`][] takes them.
     """
 
     model: str = "gaussian"
@@ -27,6 +28,14 @@ class Options(NamedTuple):
     columns: Mapping[str, str | None] = {}
     scale: Mapping[str, float] = {}
     units: Mapping[str, str] = {}
+    period: Mapping[str, float] = {}
+    repair: bool = True
+
+    @property
+    def reading(self) -> dict[str, Any]:
+        """The arguments of [`jaxfric.read`][]."""
+        names = ("columns", "scale", "units", "period", "repair")
+        return {name: getattr(self, name) for name in names}
 
 
 def run(
@@ -74,8 +83,7 @@ def _rows(files: Sequence[File], options: Options, jobs: int) -> Iterator[list[t
     """Rows as they become ready, in bundles."""
     over = devices.mesh(jax.local_devices())
     batches = Batches(options.model, options.projection, options.bounds, over, len(files))
-    how = {"columns": options.columns, "scale": options.scale, "units": options.units}
-    for item in ahead(files, how, jobs, most=4 * jobs):
+    for item in ahead(files, options.reading, jobs, most=4 * jobs):
         if isinstance(item, Failure):
             yield [(item.file, failed(None, item.reason))]
         elif rows := [(i.file, row) for i, row in batches.add(item)]:

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..io import write_bytes, write_table
-from ..tables import optional
+from ..data.io import write_bytes, write_table
+from ..data.printable import encodable
+from ..data.tables import optional
+from ..data.targets import replaced
 from .files import File
 from .journal import Row
 
@@ -25,8 +27,12 @@ _FACTS = {
     "windows": int,
     "covered": float,
     "reason": str,
+    "warnings": str,
     "notes": str,
 }
+# What a cell begins with that a spreadsheet takes for a formula.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
+_HEAD = b"file,axis,group"
 _KINDS = {"value": "", "standard_error": "_standard_error", "unit": "_unit"}
 
 
@@ -58,8 +64,7 @@ def check(out: str) -> None:
     path = Path(out)
     if path.suffix.lower() not in FORMATS:
         raise ValueError(f"{out}: a fleet is written as {' or '.join(FORMATS)}; use that suffix.")
-    if path.is_dir():
-        raise ValueError(f"{out}: is a folder; name a file.")
+    replaced(path)
     if not path.absolute().parent.is_dir():
         raise ValueError(f"{out}: there is no folder {path.parent}; make it first.")
     if not os.access(path.absolute().parent, os.W_OK):
@@ -68,14 +73,30 @@ def check(out: str) -> None:
         optional("pyarrow.parquet", path)
 
 
+def is_one(path: str) -> bool:
+    """Whether a file is the table of a fleet, by the names of its first columns."""
+    if not path.lower().endswith(".parquet"):
+        with open(path, "rb") as file:
+            return file.read(len(_HEAD)) == _HEAD
+    try:
+        names = optional("pyarrow.parquet", Path(path)).read_schema(path).names
+    except (ValueError, OSError):  # no Parquet at all
+        return False
+    return ",".join(names[:3]).encode() == _HEAD
+
+
 def write(out: str | os.PathLike, table: Mapping[str, Sequence[Any]]) -> None:
     """Write the table, Parquet or CSV by suffix, whole or not at all.
+
+    Bytes of a path that are no UTF-8 are spelled out. In CSV no text begins as a formula does.
 
     **Raises:** `ValueError` if it cannot be written there.
     """
     path = Path(out)
+    table = {name: [_encodable(cell) for cell in column] for name, column in table.items()}
     if path.suffix.lower() == ".csv":
-        write_table(path, {name: np.array(column, object) for name, column in table.items()})
+        safe = {name: [_no_formula(name, c) for c in column] for name, column in table.items()}
+        write_table(path, {name: np.array(column, object) for name, column in safe.items()})
         return
     pa, parquet = optional("pyarrow", path), optional("pyarrow.parquet", path)
     types = {str: pa.string(), int: pa.int64(), float: pa.float64()}
@@ -83,6 +104,17 @@ def write(out: str | os.PathLike, table: Mapping[str, Sequence[Any]]) -> None:
     content = BytesIO()
     parquet.write_table(pa.table(arrays), content)
     write_bytes(path, content.getvalue())
+
+
+def _encodable(cell: Any) -> Any:
+    return encodable(cell) if isinstance(cell, str) else cell
+
+
+def _no_formula(name: str, cell: Any) -> Any:
+    """A cell that no spreadsheet computes: the same path of a file, another text quoted."""
+    if not isinstance(cell, str) or not cell.startswith(_FORMULA):
+        return cell
+    return os.path.join(os.curdir, cell) if name == "file" else f"'{cell}"
 
 
 def _type(name: str, column: Sequence[Any]) -> type:

@@ -3,8 +3,9 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from .. import identified
-from ..tabulate import aligned
+from ..data.printable import printable
+from ..identification import identified
+from ..looks.text import aligned
 from .comparing import FORCE_ERROR, LEVEL, Drift, Summary, Usual
 from .files import File
 from .journal import Row
@@ -24,15 +25,24 @@ def summary(files: Sequence[File], rows: Mapping[str, Row], found: Summary) -> s
 def troubles(files: Sequence[File], rows: Mapping[str, Row]) -> str:
     """The files that gave no result and why; and the other results, once each."""
     failed = [rows[f.path]["reason"] for f in files if rows[f.path]["result"] == "failed"]
-    lines = [f"failed: {reason}" for reason in failed[:MOST]] + _more(failed)
+    lines = [f"failed: {printable(reason)}" for reason in failed[:MOST]] + _more(failed)
     results = dict.fromkeys(rows[file.path]["result"] for file in files)
     for result in results:
         if result not in ("successful", "failed"):
-            named = [file.path for file in files if rows[file.path]["result"] == result]
+            named = [printable(file.path) for file in files if rows[file.path]["result"] == result]
             shown = ", ".join(named[:3]) + (f" and {len(named) - 3} more" if len(named) > 3 else "")
             lines.append(f"{result}: {identified.Result[getattr(identified.Result, result)]}")
             lines.append(f"  {shown}")
-    return "\n".join(lines)
+    return "\n".join(lines + _warned(files, rows))
+
+
+def _warned(files: Sequence[File], rows: Mapping[str, Row]) -> list[str]:
+    """How many recordings each warning is about, and the first of them; its column has all."""
+    paths: dict[str, list[str]] = {}
+    for file in files:
+        for name in filter(None, (rows[file.path].get("warnings") or "").split(", ")):
+            paths.setdefault(name, []).append(printable(file.path))
+    return [f"warning {name}: {len(on)} recordings, {on[0]} first" for name, on in paths.items()]
 
 
 def _usual(usual: Sequence[Usual]) -> list[str]:
@@ -64,7 +74,7 @@ def _outliers(found: Summary) -> list[str]:
     for one in found.outliers[:MOST]:
         share = one.name == FORCE_ERROR
         value, usual = (f"{x:.2%}" if share else f"{x:.4g}" for x in (one.value, one.usual.median))
-        cells = [f"{one.path}  {one.name}", value, "" if share else one.unit, usual]
+        cells = [f"{printable(one.path)}  {one.name}", value, "" if share else one.unit, usual]
         table.append([*cells, f"{one.deviations:+.1f}", _chance(one.chance)])
     note = f"chance: that any of the {tried} values tried is so far off by itself"
     return ["", *aligned(table, {1, 3, 4, 5}), *_more(found.outliers), note]
@@ -77,7 +87,9 @@ def _drifts(found: Summary) -> list[str]:
         return ["", f"No drift among {tried} courses of an axis's parameter."] if tried else []
     table = [["drift", "slope", "± s.e.", "unit", "from", "to", "chance"]]
     for drift in shown[:MOST]:
-        table.append([f"{drift.axis}  {drift.name}", *_course(drift), _chance(drift.chance)])
+        table.append(
+            [f"{printable(drift.axis)}  {drift.name}", *_course(drift), _chance(drift.chance)]
+        )
     note = f"chance: that any of the {tried} slopes tried is so far from zero by itself"
     return ["", *aligned(table, {1, 2, 4, 5, 6}), *_more(shown), note]
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..fleet.comparing import FORCE_ERROR, LEVEL, Drift, Summary
 from ..fleet.files import File
 from ..fleet.journal import Row
-from ..uncertainty import COSINES, student_quantile
+from ..identification.uncertainty import COSINES, student_quantile
 from .pictures import library
 
 ACROSS = 3

@@ -1,11 +1,12 @@
 """The HTML page of an explanation: one file that needs no network, for the screen and for paper."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from ..effects import EFFECTS
+from ..looks.html import table as _table
+from ..terms.effects import EFFECTS
 from . import charts
 
 # Half a 95 % interval in standard errors, as in the findings' sentences.
@@ -32,6 +33,8 @@ h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.15rem; margin: 2r
 .file { color: #555; overflow-wrap: anywhere; margin: 0 0 1rem; }
 .verdict { border-left: .5rem solid var(--tone); background: #f5f6f7; padding: .8rem 1rem; }
 .verdict strong { color: var(--tone); }
+.warnings { border-left: .5rem solid #b26a00; background: #f5f6f7; margin: .6rem 0;
+  padding: .6rem 1rem .6rem 2rem; }
 .numbers { display: flex; flex-wrap: wrap; gap: .8rem 2.5rem; margin: 1rem 0; padding: 0; }
 .numbers div { min-width: 9rem; } .numbers dt { color: #555; font-size: .85rem; }
 .numbers dd { margin: 0; font-size: 1.2rem; font-variant-numeric: tabular-nums; }
@@ -126,7 +129,14 @@ def _head(document: Mapping[str, Any], file: str) -> str:
 <div class="verdict" style="--tone: {tone}">
 <strong>{escape(name)}.</strong> {escape(sentence)}
 </div>
-{_numbers(document.get("fit") or {})}"""
+{_warnings(document, sentence)}{_numbers(document.get("fit") or {})}"""
+
+
+def _warnings(document: Mapping[str, Any], said: str) -> str:
+    """What makes the answer doubtful, but for what the verdict's sentence says already."""
+    texts = [each["text"] for each in document.get("warnings") or () if each["text"] not in said]
+    entries = "".join(f"<li>{escape(text)}</li>" for text in texts)
+    return f'<ul class="warnings">{entries}</ul>\n' if entries else ""
 
 
 def _numbers(fit: Mapping[str, Any]) -> str:
@@ -135,6 +145,8 @@ def _numbers(fit: Mapping[str, Any]) -> str:
         "force_error": "Force error",
         "holdout_force_error": "… on the held-out recording",
         "simulation_error": "Simulation error",
+        "filtered_force_error": "Filtered force error",
+        "filtered_holdout_force_error": "… on the held-out recording",
     }
     entries = [
         (label, f"{_percent(fit[key].get('before'))} → {_percent(fit[key].get('after'))}")
@@ -142,9 +154,26 @@ def _numbers(fit: Mapping[str, Any]) -> str:
         if fit.get(key)
     ]
     if fit.get("noise_floor") is not None:
-        entries.append(("Noise floor", _percent(fit["noise_floor"])))
+        entries.append(("Noise floor of the force error", _percent(fit["noise_floor"])))
     cells = [f"<div><dt>{escape(label)}</dt><dd>{value}</dd></div>" for label, value in entries]
-    return f'<dl class="numbers">{"".join(cells)}</dl>' if cells else ""
+    return f'<dl class="numbers">{"".join(cells)}</dl>{_how_measured(fit)}' if cells else ""
+
+
+def _how_measured(fit: Mapping[str, Any]) -> str:
+    """What the figures are, where there are two kinds."""
+    width = (fit.get("filtered_force_error") or {}).get("width")
+    if width is None:
+        return ""
+    text = (
+        "Force error: norm(force − predicted)/norm(force) over the samples in motion, as jaxfric "
+        "predict has it with the saved model, noise and all. Filtered: both passed through the "
+        f"kernel by which effects are looked for, half-width {1e3 * width:.3g} ms."
+    )
+    adjusted = fit.get("holdout_adjusted") or {}
+    for key, how in (("left_out", "left out"), ("rephased", "taken at its own phase")):
+        if names := adjusted.get(key):
+            text += f" On the held-out recording {', '.join(map(_spoken, names))} is {how}."
+    return f'<p class="note">{escape(text)}</p>'
 
 
 def _section(title: str, content: str, note: str = "") -> str:
@@ -153,22 +182,6 @@ def _section(title: str, content: str, note: str = "") -> str:
         return ""
     remark = f'<p class="note">{escape(note)}</p>' if note else ""
     return f"<section>\n<h2>{escape(title)}</h2>\n{remark}{content}\n</section>"
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]], numeric: Sequence[int] = ()) -> str:
-    """A table of plain text; nothing for no row."""
-    if not rows:
-        return ""
-
-    def cells(row: Sequence[str], tag: str) -> str:
-        marks = [' class="number"' if i in numeric else "" for i in range(len(row))]
-        pairs = zip(row, marks, strict=True)
-        return "".join(f"<{tag}{mark}>{escape(str(cell))}</{tag}>" for cell, mark in pairs)
-
-    body = "\n".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return (
-        f"<table>\n<thead><tr>{cells(head, 'th')}</tr></thead>\n<tbody>\n{body}\n</tbody></table>"
-    )
 
 
 def _findings(document: Mapping[str, Any]) -> str:

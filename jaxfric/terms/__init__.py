@@ -30,9 +30,15 @@ from .friction import (
     Viscous as Viscous,
 )
 from .inertia import Inertia as Inertia, Offset as Offset
+from .known import (
+    KNOWN_FORCE as KNOWN_FORCE,
+    KnownForce as KnownForce,
+    KnownGain as KnownGain,
+)
 from .position import (
     Cogging as Cogging,
     EndStop as EndStop,
+    Gravity as Gravity,
     GravityUnbalance as GravityUnbalance,
     HardeningSpring as HardeningSpring,
     LowerEndStop as LowerEndStop,
@@ -47,7 +53,7 @@ from .presliding import (
     FrictionalLag as FrictionalLag,
     LuGre as LuGre,
 )
-from .sample import Parameter as Parameter, Sample as Sample
+from .sample import Parameter as Parameter, Resolution as Resolution, Sample as Sample
 from .table import Table as Table
 from .time import (
     AbstractModulated as AbstractModulated,

@@ -2,7 +2,7 @@
 
 An axis obeys u = Σ_j (f0_j + g_jᵀ α_j): the actuator force is a sum of terms. A term's nonlinear
 parameters β are its pytree leaves; its affine parameters α belong to nobody until they are solved
-for (`jaxfric.reduced`), and then live beside the terms in a [`Model`][jaxfric.models.Model].
+for (`jaxfric.identification`), and then live beside the terms in a [`Model`][jaxfric.models.Model].
 """
 
 from abc import abstractmethod
@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ..recording import Recording
+from ..data.recording import Recording
 from .sample import Parameter, Sample, Scales, samples
 
 
@@ -109,7 +109,7 @@ class AbstractLaw(AbstractTerm):
         return jnp.zeros_like(recording.time)
 
     def beta(self) -> Float[Array, " d"]:
-        return _vector([getattr(self, parameter.name) for parameter in self.nonlinear])
+        return vector([getattr(self, parameter.name) for parameter in self.nonlinear])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "AbstractLaw":
         if not self.nonlinear:
@@ -119,9 +119,14 @@ class AbstractLaw(AbstractTerm):
 
 
 class Sum(AbstractTerm):
-    """A sum of terms; its parameters are those of the summands, in their order."""
+    """A sum of terms; its parameters are those of the summands, in their order.
 
-    terms: tuple[AbstractTerm, ...]
+    A sum inside of it gives its own summands.
+    """
+
+    terms: tuple[AbstractTerm, ...] = eqx.field(
+        converter=lambda terms: tuple(leaf for term in terms for leaf in summands(term))
+    )
 
     @property
     def affine(self) -> tuple[Parameter, ...]:
@@ -149,7 +154,7 @@ class Sum(AbstractTerm):
         return sum((term.offset(recording) for term in self.terms), jnp.zeros_like(recording.time))
 
     def beta(self) -> Float[Array, " d"]:
-        return _joined([term.beta() for term in self.terms])
+        return joined([term.beta() for term in self.terms])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "Sum":
         counts = [len(term.nonlinear) for term in self.terms]
@@ -204,7 +209,7 @@ class Directional(AbstractTerm):
         return jnp.where(v > 0, positive, jnp.where(v < 0, negative, jnp.zeros_like(v)))
 
     def beta(self) -> Float[Array, " d"]:
-        return _joined([self.positive.beta(), self.negative.beta()])
+        return joined([self.positive.beta(), self.negative.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "Directional":
         positive, negative = _split(
@@ -248,21 +253,27 @@ def bounds(
 
 
 def _batched(body, recording: Recording) -> Float[Array, "N p"]:
-    return jax.vmap(lambda sample: _vector(body(sample)))(samples(recording))
+    return jax.vmap(lambda sample: vector(body(sample)))(samples(recording))
 
 
-def _vector(values) -> Float[Array, " k"]:
+def vector(values) -> Float[Array, " k"]:
     """Numbers as one vector; a batch of each as a batch of vectors."""
     if values and all(isinstance(v, np.ndarray | np.generic) for v in values):
         return np.stack(values, axis=-1)
-    return jnp.stack([jnp.asarray(v) for v in values], axis=-1) if values else jnp.zeros((0,))
+    return jnp.stack([jnp.asarray(v) for v in values], axis=-1) if values else _nothing()
 
 
-def _joined(vectors) -> Float[Array, " k"]:
-    full = [vector for vector in vectors if vector.shape[-1]]
-    if full and all(isinstance(vector, np.ndarray) for vector in full):
+def _nothing() -> np.ndarray:
+    """No number, in jax's default precision; of numpy, so that nothing is compiled."""
+    return np.zeros((0,), jax.dtypes.canonicalize_dtype(float))
+
+
+def joined(vectors) -> Float[Array, " k"]:
+    """Vectors as one; batches of each as a batch."""
+    full = [each for each in vectors if each.shape[-1]]
+    if full and all(isinstance(each, np.ndarray) for each in full):
         return np.concatenate(full, axis=-1)  # of what was moved to numpy nothing is compiled
-    return jnp.concatenate(full, axis=-1) if full else jnp.zeros((0,))
+    return jnp.concatenate(full, axis=-1) if full else _nothing()
 
 
 def _split(vector, counts):

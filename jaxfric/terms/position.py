@@ -5,6 +5,7 @@ the distance between two samples. `sin` and `cos` amplitudes are affine; amplitu
 wave follow from them: A = √(a_sin² + a_cos²), φ = atan2(a_cos, a_sin).
 """
 
+import math
 from typing import ClassVar
 
 import equinox as eqx
@@ -13,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ..units import FORCE, INERTIA, POSITION, STIFFNESS, Dimension
 from .base import AbstractLaw
-from .sample import Parameter, Sample
+from .sample import Parameter, Resolution, Sample
 
 UNKNOWN = float("nan")
 POSITION_ONLY = frozenset({"position"})
@@ -63,6 +64,16 @@ def _spot_bounds(scales):
     return _shortest(scales), 0.25 * _stroke(scales)
 
 
+# A wave of a period a little off falls out of step by the end of the stroke: the cost's minimum is
+# one cycle more or less wide, and four points a cycle leave no more than an eighth of one.
+_PER_CYCLE = 4
+
+
+def _cycles(harmonics: int = 1) -> Resolution:
+    """The grid of a period that is seen over the stroke, with its harmonics."""
+    return Resolution(-1, _PER_CYCLE * harmonics, _stroke, 1024 * harmonics)
+
+
 def wave(name: str, dimension: Dimension, harmonics: int = 1) -> tuple[Parameter, ...]:
     """Affine parameters of a wave: sine and cosine amplitude of each harmonic."""
     stems = [name if n == 1 else f"{name}_harmonic{n}" for n in range(1, harmonics + 1)]
@@ -74,6 +85,14 @@ def waves(argument, harmonics: int = 1):
     return tuple(f(n * argument) for n in range(1, harmonics + 1) for f in (jnp.sin, jnp.cos))
 
 
+# Less than a cycle: what is told apart are the curvatures of its pieces, not their phases.
+_LONG = Resolution(-1, 16, _stroke, 16)
+# Two spots one width apart overlap by exp(−1/4) = 0.8; 1.5 points a width and two widths an octave
+# leave no spot without a neighbour that overlaps it by 0.9.
+_BY_WIDTH = Resolution(1, 1.5, None, 96, "spot_width")
+_WIDTH = Resolution(0, 2, None, 12)
+
+
 class GravityUnbalance(AbstractLaw):
     """Weight of an eccentric mass, hardly a turn a stroke: F = A sin(2πx/L + φ).
 
@@ -83,11 +102,25 @@ class GravityUnbalance(AbstractLaw):
 
     unbalance_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("unbalance", FORCE)
-    nonlinear: ClassVar = (Parameter("unbalance_period", POSITION, _long_bounds),)
+    nonlinear: ClassVar = (Parameter("unbalance_period", POSITION, _long_bounds, resolution=_LONG),)
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.unbalance_period)
+
+
+class Gravity(AbstractLaw):
+    """Weight of an eccentric mass on the turning axis itself: u = G sin(2πx/L + φ), L one turn.
+
+    `turn` L is a given number: 2π rad, 360°, or one revolution.
+    """
+
+    turn: float = eqx.field(static=True, default=2 * math.pi)
+    affine: ClassVar = wave("gravity", FORCE)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * sample.position / self.turn)
 
 
 class Cogging(AbstractLaw):
@@ -99,12 +132,16 @@ class Cogging(AbstractLaw):
 
     pitch: Float[Array, ""] | float = UNKNOWN
     harmonics: int = eqx.field(static=True, default=1)
-    nonlinear: ClassVar = (Parameter("pitch", POSITION, _pitch_bounds),)
     coordinates: ClassVar = POSITION_ONLY
 
     @property
     def affine(self):
         return wave("cogging", FORCE, self.harmonics)
+
+    @property
+    def nonlinear(self):
+        grid = _cycles(self.harmonics)
+        return (Parameter("pitch", POSITION, _pitch_bounds, resolution=grid),)
 
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.pitch, self.harmonics)
@@ -191,7 +228,9 @@ class PositionDependentFriction(AbstractLaw):
 
     friction_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("friction", FORCE)
-    nonlinear: ClassVar = (Parameter("friction_period", POSITION, _any_period),)
+    nonlinear: ClassVar = (
+        Parameter("friction_period", POSITION, _any_period, resolution=_cycles()),
+    )
     coordinates: ClassVar = WITH_DIRECTION
 
     def law(self, sample: Sample):
@@ -209,8 +248,8 @@ class StickySpot(AbstractLaw):
     spot_width: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("spot_force", FORCE),)
     nonlinear: ClassVar = (
-        Parameter("spot_position", POSITION, _inside, logarithmic=False),
-        Parameter("spot_width", POSITION, _spot_bounds),
+        Parameter("spot_position", POSITION, _inside, logarithmic=False, resolution=_BY_WIDTH),
+        Parameter("spot_width", POSITION, _spot_bounds, resolution=_WIDTH),
     )
     coordinates: ClassVar = WITH_DIRECTION
 
@@ -227,7 +266,9 @@ class PositionDependentInertia(AbstractLaw):
 
     inertia_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("inertia", INERTIA)
-    nonlinear: ClassVar = (Parameter("inertia_period", POSITION, _any_period),)
+    nonlinear: ClassVar = (
+        Parameter("inertia_period", POSITION, _any_period, resolution=_cycles()),
+    )
     coordinates: ClassVar = frozenset({"position", "velocity", "acceleration"})
 
     def law(self, sample: Sample):

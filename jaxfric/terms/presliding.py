@@ -13,9 +13,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from ..recording import Recording
+from ..data.recording import Recording
 from ..units import FORCE, POSITION, TIME, VELOCITY
-from .base import AbstractTerm
+from .base import AbstractTerm, joined, vector
 from .friction import AbstractBump, Gaussian
 from .sample import Parameter
 
@@ -177,8 +177,8 @@ class FrictionalLag(AbstractMemory):
         return (Parameter("frictional_lag", TIME, _memory_bounds), *self.bump.nonlinear)
 
     def beta(self) -> Float[Array, " d"]:
-        own = jnp.asarray(self.frictional_lag)[..., None]
-        return jnp.concatenate([own, self.bump.beta()], axis=-1)
+        own = vector([self.frictional_lag])
+        return joined([own, self.bump.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "FrictionalLag":
         return dataclasses.replace(

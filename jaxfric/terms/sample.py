@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..recording import Recording
+from ..data.recording import Recording
 from ..units import DIMENSIONLESS, Dimension
 
 
@@ -57,14 +57,35 @@ class Scales(NamedTuple):
     interval: Float[Array, ""]
 
 
+class Resolution(NamedTuple):
+    """How finely the cost has to be looked at along a parameter β: points of equal steps in β^p.
+
+    - `power`: p; 1 for equal steps, −1 for equal steps of 1/β, 0 for equal steps of log β.
+    - `per`: points per unit of `over(scales)` · β^p; for p = 0 per octave; with `beside` per length
+      of that other parameter of the same law; with none of these over the whole range.
+    - `over`: what makes β^p a number of features (the stroke over a pitch: cycles).
+    - `usual`: points where a recording's scales are not known yet, inside `jax.jit`.
+    - `beside`: the other parameter, a length of the same dimension (a spot's width for its place).
+    """
+
+    power: int = 0
+    per: float = 4.0
+    over: Callable[[Scales], Array] | None = None
+    usual: int = 32
+    beside: str | None = None
+
+
 class Parameter(NamedTuple):
-    """A parameter's name, dimension and, where it is searched for, its compact set.
+    """A parameter's name, dimension and, where it is searched for, its compact set and its grid.
 
     `bounds` maps the [`Scales`][] of a recording to `(lower, upper)`, the set B of Kim, Kim & Ha
-    (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio.
+    (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio. `resolution`
+    says how near to each other two minima of the cost can be; `None` for a cost that is smooth over
+    octaves, or over a fraction of the range where the scale is no ratio.
     """
 
     name: str
     dimension: Dimension = DIMENSIONLESS
     bounds: Callable[[Scales], tuple[Array, Array]] | None = None
     logarithmic: bool = True
+    resolution: Resolution | None = None

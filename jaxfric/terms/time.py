@@ -8,12 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..recording import Recording
+from ..data.recording import Recording
 from ..units import FORCE, FREQUENCY, TIME
-from .base import AbstractLaw, AbstractTerm
+from .base import AbstractLaw, AbstractTerm, joined, vector
 from .friction import Coulomb, Viscous
 from .position import wave, waves
-from .sample import Parameter, Sample
+from .sample import Parameter, Resolution, Sample
 
 UNKNOWN = float("nan")
 
@@ -67,8 +67,8 @@ class AbstractModulated(AbstractTerm):
         return jnp.zeros_like(recording.time)
 
     def beta(self) -> Float[Array, " d"]:
-        own = jnp.asarray(getattr(self, self.parameter.name))[..., None]
-        return jnp.concatenate([own, self.term.beta()], axis=-1) if self.term.nonlinear else own
+        own = vector([getattr(self, self.parameter.name)])
+        return joined([own, self.term.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "AbstractModulated":
         name = self.parameter.name
@@ -107,6 +107,11 @@ def _within(scales):
     return scales.start + margin, scales.start + scales.duration - margin
 
 
+# Two dates of a step differ by what lies between them only: the cost is no parabola but a wedge,
+# and a date is refined within a step of the grid.
+_MOMENTS = Resolution(1, 256, None, 256)
+
+
 class FrictionStep(AbstractModulated):
     """Friction that changes at one moment: F = ΔF g(v) 1(t > t_c), g the law `term`.
 
@@ -117,7 +122,9 @@ class FrictionStep(AbstractModulated):
     term: AbstractTerm = Coulomb()
     step_time: Float[Array, ""] | float = UNKNOWN
     ramp: float = eqx.field(static=True, default=0.0)
-    parameter: ClassVar = Parameter("step_time", TIME, _within, logarithmic=False)
+    parameter: ClassVar = Parameter(
+        "step_time", TIME, _within, logarithmic=False, resolution=_MOMENTS
+    )
     prefix: ClassVar = "step"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
@@ -160,12 +167,20 @@ def _frequency_bounds(scales):
     return 1.5 / scales.duration, 0.25 / scales.interval
 
 
+def _record(scales):
+    return scales.duration
+
+
+# As for a pitch: out of step by a cycle over the record, the tone is another one.
+_TONES = Resolution(1, 4, _record, 4096)
+
+
 class PeriodicDisturbance(AbstractLaw):
     """A tone in time: F = A sin(2πf t + φ). `frequency` f, Hz."""
 
     frequency: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("tone", FORCE)
-    nonlinear: ClassVar = (Parameter("frequency", FREQUENCY, _frequency_bounds),)
+    nonlinear: ClassVar = (Parameter("frequency", FREQUENCY, _frequency_bounds, resolution=_TONES),)
     coordinates: ClassVar = frozenset({"time"})
 
     def law(self, sample: Sample):

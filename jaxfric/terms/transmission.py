@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..recording import Recording
+from ..data.recording import Recording
 from ..units import ACCELERATION, DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
 from .presliding import AbstractMemory, starts
-from .sample import Parameter
+from .sample import Parameter, Resolution
 
 UNKNOWN = float("nan")
 
@@ -74,6 +74,10 @@ def _coasting_bounds(scales):
 _FLANKS = 0.2
 
 
+# Three together: a factor of two from one to the next, and the refinement goes on from there.
+_OCTAVES = Resolution(0, 1, None, 12)
+
+
 class ElasticBacklash(AbstractMemory):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
@@ -87,9 +91,9 @@ class ElasticBacklash(AbstractMemory):
     load_deceleration: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("backlash_force", FORCE),)
     nonlinear: ClassVar = (
-        Parameter("half_gap", POSITION, _gap_bounds),
-        Parameter("windup", POSITION, _windup_bounds),
-        Parameter("load_deceleration", ACCELERATION, _coasting_bounds),
+        Parameter("half_gap", POSITION, _gap_bounds, resolution=_OCTAVES),
+        Parameter("windup", POSITION, _windup_bounds, resolution=_OCTAVES),
+        Parameter("load_deceleration", ACCELERATION, _coasting_bounds, resolution=_OCTAVES),
     )
     coordinates: ClassVar = frozenset({"position", "velocity", "time"})
 
@@ -176,6 +180,12 @@ def _damping_bounds(scales):
 _REST = 0.03
 
 
+# A resonance is 2ζ of its frequency wide, 15 % of an octave at ζ = 0.05; a lighter damping is
+# refined from there. Damping ratios a factor of four apart differ in height by less than that.
+_RESONANCES = Resolution(0, 12, None, 96)
+_DAMPINGS = Resolution(0, 0.5, None, 4)
+
+
 class Compliance(AbstractMemory):
     """Load on a spring and a damper, position on the motor: u = f + M_L r̈.
 
@@ -192,8 +202,8 @@ class Compliance(AbstractMemory):
     damping_ratio: Float[Array, ""] | float = UNKNOWN
     driven: str = eqx.field(static=True, default="inertia")
     nonlinear: ClassVar = (
-        Parameter("load_resonance", FREQUENCY, _resonance_bounds),
-        Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds),
+        Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_RESONANCES),
+        Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds, resolution=_DAMPINGS),
     )
 
     def __check_init__(self):
@@ -259,6 +269,10 @@ _DRIVES = {
 }
 
 
+# What dry friction takes besides makes the resonance as wide as at a damping of 0.15 or so.
+_DRY = Resolution(0, 4, None, 32)
+
+
 class DryCompliance(AbstractMemory):
     """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
 
@@ -271,7 +285,11 @@ class DryCompliance(AbstractMemory):
     damping_ratio: Float[Array, ""] | float = UNKNOWN
     load_deceleration: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (_LOAD_INERTIA,)
-    nonlinear: ClassVar = (*Compliance.nonlinear, ElasticBacklash.nonlinear[2])
+    nonlinear: ClassVar = (
+        Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_DRY),
+        *Compliance.nonlinear[1:],
+        *ElasticBacklash.nonlinear[2:],
+    )
     coordinates: ClassVar = frozenset({"position", "velocity", "time"})
 
     @property

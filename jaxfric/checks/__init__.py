@@ -1,0 +1,16 @@
+"""What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
+
+from .fitted import Design as Design, fitted as fitted
+from .kinds import (
+    KINDS as KINDS,
+    NAMES as NAMES,
+    Remark as Remark,
+    none as none,
+    remarks as remarks,
+)
+from .recorded import LONE as LONE, lone as lone, recorded as recorded
+
+
+def inspect(recording) -> tuple[Remark, ...]:
+    """The remarks on a recording itself, whatever model is fitted; signals of shape `(N,)`."""
+    return remarks(recorded(recording), recording.unit_names)

@@ -1,0 +1,170 @@
+"""Faults that show in what a model leaves of a recording, on the host."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Array, Float
+
+from .kinds import places
+
+# What a remark is about changes the force by a twentieth of its size, or it is no matter.
+MATTERS = 0.05
+# It takes half of the power that the model leaves: two parts of a record with parameters of their
+# own take p of J rows' power from noise, which is far less (see ROWS).
+HALF = 0.5
+# Rows for each parameter in either part of a record.
+ROWS = 10
+# Where a record is split.
+SPLITS = tuple(i / 10 for i in range(1, 10))
+# A tenth of the force, a hundredth of its power, is more than any filter or ripple of the log
+# leaves; it is structure where it is twice the size of what neighbouring rows differ by.
+LEFT, ROUGH = 0.1, 2.0
+# Of a third of the force, a tenth of its power, everyone wants to know, noise or not.
+LARGE = 0.3
+
+
+class Design(NamedTuple):
+    """The rows of the weak form that a fit is judged by.
+
+    - `columns`: derivatives of the rows by all parameters, affine ones first, `(J, P)`.
+    - `target`: the force, N, and `left`, what the model leaves of it, `(J,)`.
+    - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
+    """
+
+    columns: Float[Array, "J P"]
+    target: Float[Array, " J"]
+    left: Float[Array, " J"]
+    weight: Float[Array, " J"]
+    time: Float[Array, " J"]
+
+
+def fitted(design: Design, force_error: float) -> np.ndarray:
+    """The numbers of the faults that a fit shows, `(W,)`, as [`kinds`][] orders them."""
+    rows = np.flatnonzero(np.asarray(design.weight) > 0)
+    columns = np.asarray(design.columns, float)[rows]
+    size = np.max(np.abs(columns), axis=0, initial=0.0)
+    columns = columns[:, size > 0] / size[size > 0]
+    if not np.isfinite(columns).all():
+        return places({})
+    if len(rows) < ROWS * max(columns.shape[1], 1):
+        return places({"few_rows": len(rows)})
+    target, left = (np.asarray(x, float)[rows] for x in (design.target, design.left))
+    power, energy = float(target @ target), float(left @ left)
+    if not (np.isfinite(power) and np.isfinite(energy)) or power == 0:
+        return places({})
+    # What turns the columns into each other takes little off the residual and much from the truth.
+    found = _slightly_late(design, rows, columns, energy, power)
+    found |= found or _gain(columns, target, left)
+    if not found and energy > MATTERS**2 * power:
+        found |= _late(design, rows, columns, energy, power)
+        found |= found or _split(columns, target, left, np.asarray(design.time)[rows], power)
+    if force_error > LEFT and np.sqrt(energy) > max(LEFT * np.sqrt(power), ROUGH * _rough(left)):
+        found["structure_left"] = force_error
+    elif force_error > LARGE:
+        found["large_error"] = force_error
+    return places(found)
+
+
+# Of a force with less of its power in one sign, a tenth of its size, a gain of that sign would be
+# read off next to nothing.
+ONE_SIGN = 0.01
+
+
+def _gain(columns, target, left) -> dict[str, float]:
+    """The gain of the positive force, where one of its own leaves half of the residual.
+
+    Noise alone never gives half: what of it is in the positive force is half of it at most.
+    """
+    positive = np.maximum(target, 0.0)
+    powers = float(positive @ positive), float(target @ target)
+    if not ONE_SIGN * powers[1] < powers[0] < (1 - ONE_SIGN) * powers[1]:
+        return {}
+    basis = np.linalg.qr(columns)[0]
+    own = positive - basis @ (basis.T @ positive)
+    size = float(own @ own)
+    if size <= 1e-6 * powers[0]:
+        return {}
+    share = float(own @ left) / size
+    if share**2 * size > HALF * float(left @ left) and MATTERS < abs(share) < 1:
+        return {"gain_by_sign": 1 / (1 - share)}
+    return {}
+
+
+def _rough(left: np.ndarray) -> float:
+    """The size of what rows differ by that share no samples: of noise, as large as all of it."""
+    apart = left[2:] - left[:-2]
+    return float(np.sqrt(0.5 * len(left) * np.mean(apart**2))) if len(apart) else 0.0
+
+
+def _split(columns, target, left, time, power) -> dict[str, float]:
+    """When the parameters change, where two parts of the record obey parameters of their own."""
+    energy, best = float(left @ left), (np.inf, 0.0)
+    for share in SPLITS:
+        at = round(share * len(target))
+        if min(at, len(target) - at) < ROWS * columns.shape[1]:
+            continue
+        parts = sum(_least(columns[part], left[part]) for part in (slice(at), slice(at, None)))
+        best = min(best, (parts, float(time[at])))
+    if best[0] < HALF * energy and energy - best[0] > MATTERS**2 * power:
+        return {"change_in_the_middle": best[1]}
+    return {}
+
+
+def _least(columns: np.ndarray, target: np.ndarray) -> float:
+    solved = np.linalg.lstsq(columns, target, rcond=1e-10)[0]
+    rest = target - columns @ solved
+    return float(rest @ rest)
+
+
+def _slightly_late(design: Design, rows, columns, energy, power) -> dict[str, float]:
+    """A delay of less than a row, by its first order: u(t + τ) = u + τ du/dt.
+
+    Half a sample of it is damping to a light, fast axis.
+    """
+    end = rows[-1] + 1  # beyond is padding
+    time, whole = (np.asarray(x, float)[:end] for x in (design.time, design.target))
+    if not np.all(np.diff(time) > 0):
+        return {}
+    slope = np.gradient(whole, time)[rows]
+    basis = np.linalg.qr(columns)[0]
+    own = slope - basis @ (basis.T @ slope)
+    size = float(own @ own)
+    if size <= 1e-6 * float(slope @ slope):
+        return {}
+    part = float(own @ np.asarray(design.left, float)[rows])
+    late = -part / size
+    counts = late**2 * float(slope @ slope) > MATTERS**2 * power
+    if part**2 / size > HALF * energy and counts and abs(late) < float(np.median(np.diff(time))):
+        return {"force_late": late}
+    return {}
+
+
+def _late(design: Design, rows, columns, energy, power) -> dict[str, float]:
+    """By how much the force is late, where taking it earlier leaves half of the residual.
+
+    To first order in the nonlinear parameters, whose columns are among the others.
+    """
+    time = np.asarray(design.time, float)[: rows[-1] + 1]  # beyond is padding
+    whole = np.asarray(design.target, float)[: rows[-1] + 1]
+    if not np.all(np.diff(time) > 0):
+        return {}
+    known = whole[rows] - np.asarray(design.left, float)[rows]
+    basis = np.linalg.qr(columns)[0]
+    # Whole rows: halfway between two of them their noise would be less.
+    spacing = float(np.median(np.diff(time)))
+    ladder = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512])
+    ladder = ladder[ladder < len(time) // 10]
+
+    def left(lag: int) -> float:
+        shifted = np.interp(time[rows] + lag * spacing, time, whole) - known
+        rest = shifted - basis @ (basis.T @ shifted)
+        return float(rest @ rest)
+
+    tried = {lag: left(lag) for lag in map(int, np.concatenate([ladder, -ladder]))}
+    best = min(tried, key=tried.__getitem__, default=0)
+    for lag in range(best - abs(best) // 3, best + abs(best) // 3 + 1):
+        tried[lag] = left(lag)
+    best = min(tried, key=tried.__getitem__, default=0)
+    if best and tried[best] < HALF * energy and energy - tried[best] > MATTERS**2 * power:
+        return {"force_late": best * spacing}
+    return {}

@@ -1,0 +1,272 @@
+"""The faults that are looked for: names, severity, and the sentence with the remedy."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Kind(NamedTuple):
+    """A fault: its name, whether results beside it are certain to be wrong, and its sentence.
+
+    In the sentence `{value}` is the number found, `{force}` and `{position}` are the units.
+    """
+
+    name: str
+    severe: bool
+    text: str
+
+
+class Remark(NamedTuple):
+    """A named sentence about a recording or a result.
+
+    `severe`: what is said beside it is certain to be wrong.
+    """
+
+    name: str
+    text: str
+    severe: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """The remark as plain data."""
+        return self._asdict()
+
+
+KINDS = (
+    Kind(
+        "velocity_sign",
+        True,
+        "The velocity column has the opposite sign of the position's derivative. Give "
+        "--scale velocity=-1 (or position=-1, if the force has the velocity's sign).",
+    ),
+    Kind(
+        "velocity_scale",
+        True,
+        "The position moves {value:.4g} times as fast as the velocity column says, so the two are "
+        "in different units{guess}. Give --scale velocity={value:.6g}, or leave the column out: "
+        "--columns velocity= .",
+    ),
+    Kind(
+        "velocity_gain",
+        False,
+        "The position moves {value:.3g} times as fast as the velocity column says: its unit or its "
+        "filter is a little off. Leave it out (--columns velocity=) to use the position.",
+    ),
+    Kind(
+        "velocity_unrelated",
+        True,
+        "The velocity column is not the derivative of the position: they share {value:.0%} of "
+        "their power. A column of another axis, or swapped? Name the right ones with --columns.",
+    ),
+    Kind(
+        "velocity_late",
+        False,
+        "The velocity column is {value:.3g} s late beside the position (early, if negative), so "
+        "that friction changes its sign at the wrong time. Leave it out: --columns velocity= .",
+    ),
+    Kind(
+        "force_constant",
+        True,
+        "The force column holds {value:.0f} different values only: it is no measurement of this "
+        "motion. Name another column: --columns force=NAME.",
+    ),
+    Kind(
+        "force_is_motion",
+        True,
+        "The force column is the position or the velocity times a constant, within {value:.1%}: no "
+        "drive's force is. Name the force's own column: --columns force=NAME.",
+    ),
+    Kind(
+        "position_is_reference",
+        True,
+        "The position equals the reference in every sample: it is the set-point, not what the axis "
+        "did. Name the measured column: --columns position=NAME.",
+    ),
+    Kind(
+        "no_motion",
+        True,
+        "The position shows no motion beyond its noise, so that there is no speed to tell forces "
+        "by. Is it the column of an axis that moved?",
+    ),
+    Kind(
+        "broken_clock",
+        False,
+        "The time stamps break the recording into {value:.0f} pieces, too short to filter: stamps "
+        "of arrival in packets, or lost samples. Log the drive's own clock.",
+    ),
+    Kind(
+        "one_speed",
+        False,
+        "The axis moves at one speed only, within {value:.0%}: friction at that speed is all that "
+        "can be seen, neither its slope nor the inertia. Move at several speeds.",
+    ),
+    Kind(
+        "force_frozen",
+        False,
+        "The force keeps one value for {value:.0%} of the recording while the axis moves: the "
+        "sensor or the log stood still. Empty these cells, which masks them.",
+    ),
+    Kind(
+        "force_held",
+        False,
+        "The force keeps each value for {value:.0f} samples: it is logged at a slower rate than "
+        "the motion, and late by half of that. Log both at one rate, or the motion at the force's.",
+    ),
+    Kind(
+        "force_wraps",
+        False,
+        "At {value:.0f} samples the force jumps across its whole range in full motion: its numbers "
+        "overflow. Log it with more bits.",
+    ),
+    Kind(
+        "force_levels",
+        False,
+        "The force column holds {value:.0f} different values only, so that it is known to a good "
+        "part of its range at best. Log it with more digits.",
+    ),
+    Kind(
+        "force_clipped",
+        False,
+        "In {value:.0%} of the samples the force stays at the end of its range: a clipped signal, "
+        "unless the drive was at its limit. Widen the range of the log, or leave these samples out "
+        "(an empty cell masks one).",
+    ),
+    Kind(
+        "force_spikes",
+        False,
+        "{value:.0f} samples hold a force ten times beyond all others: made by the sensor or the "
+        "file. Empty these cells, which masks them.",
+    ),
+    Kind(
+        "position_spikes",
+        False,
+        "The position jumps to and fro at {value:.0f} samples, as no motion does. Empty these "
+        "cells, which masks them.",
+    ),
+    Kind(
+        "velocity_spikes",
+        False,
+        "The velocity column jumps to and fro at {value:.0f} samples, as no motion does. Empty "
+        "these cells, which masks them, or leave the column out: --columns velocity= .",
+    ),
+    Kind(
+        "one_direction",
+        False,
+        "Only {value:.1%} of the slip is in one of the two directions, so that its friction is an "
+        "extrapolation. Move both ways.",
+    ),
+    Kind(
+        "coarse_sampling",
+        False,
+        "The position changes faster than its samples resolve (few of them a cycle, or stamps that "
+        "jitter): the velocity from it is off by some "
+        "{value:.1%} of its size. Log faster, or log the drive's velocity.",
+    ),
+    Kind(
+        "few_samples_a_cycle",
+        False,
+        "The motion has {value:.1f} samples a cycle, so that friction and inertia are averaged "
+        "together. Log faster, sixteen samples a cycle at least.",
+    ),
+    Kind(
+        "velocity_noise",
+        False,
+        "The noise of the position leaves {value:.1%} of error in the velocity. Move faster, or "
+        "log a finer position or the drive's velocity.",
+    ),
+    Kind(
+        "magnitude",
+        False,
+        "The axis moves at {value:.3g} {position}/s, faster than any drive: the position is in "
+        "another unit than {position}, or the time is. Give --scale or --units.",
+    ),
+    Kind(
+        "force_is_acceleration",
+        False,
+        "The force is the acceleration times a constant, within {value:.1%}: either the axis has "
+        "next to no friction, or the column is no force.",
+    ),
+    Kind(
+        "few_rows",
+        False,
+        "Between the reversals only {value:.0f} stretches are long enough to filter, too few to "
+        "check the fit by: few samples a stroke, or a short recording. Log faster or longer.",
+    ),
+    Kind(
+        "force_late",
+        False,
+        "Taken {value:.3g} s earlier, the force fits the motion with half the error: force and "
+        "motion were logged with different delays. Shift one of them; jaxfric explain tells more.",
+    ),
+    Kind(
+        "gain_by_sign",
+        False,
+        "With {value:.3g} times as much of its positive part the model fits the force with half "
+        "the error: the sensor or amplifier has a gain of its own for each sign.",
+    ),
+    Kind(
+        "change_in_the_middle",
+        False,
+        "Before and after {value:.4g} s the recording obeys different parameters: another machine "
+        "or gain, a payload, or an axis that changed. Identify the two parts by themselves.",
+    ),
+    Kind(
+        "negative_parameter",
+        False,
+        "{value:.0f} of inertia, Coulomb and viscous friction are negative beyond their intervals, "
+        "as in no passive axis: the force or the velocity is late, or something is missing.",
+    ),
+    Kind(
+        "large_error",
+        False,
+        "The model leaves {value:.0%} of the force, as noise or as something faster than the rows: "
+        "a hum, a wrong column? Look at the residual before the parameters are used.",
+    ),
+    Kind(
+        "structure_left",
+        False,
+        "The model leaves {value:.0%} of the force, and not as noise: something is missing from "
+        "it, and the parameters hold a part of that. jaxfric explain says what.",
+    ),
+)
+NAMES = tuple(kind.name for kind in KINDS)
+
+
+def none() -> np.ndarray:
+    """No remark: a place for each of the [`KINDS`][], NaN, `(W,)`."""
+    return np.full(len(KINDS), np.nan)
+
+
+def places(found: Mapping[str, float]) -> np.ndarray:
+    """The numbers found, by name, in the order of the [`KINDS`][], `(W,)`; NaN elsewhere."""
+    return np.array([found.get(name, np.nan) for name in NAMES])
+
+
+# Factors between units that logs mix, as the position's derivative over the velocity column.
+_FACTORS = {
+    "rpm beside rad": 2 * np.pi / 60,
+    "rpm beside deg": 6.0,
+    "rpm beside revolutions": 1 / 60,
+    "rad/s beside deg": 180 / np.pi,
+    "deg/s beside rad": np.pi / 180,
+    "rad/s beside revolutions": 1 / (2 * np.pi),
+    "revolutions/s beside rad": 2 * np.pi,
+    "a thousandth": 1000.0,
+    "a thousandfold": 1e-3,
+}
+
+
+def _guess(value: float) -> str:
+    near = [name for name, factor in _FACTORS.items() if abs(value / factor - 1) < 0.03]
+    return f" ({near[0]}?)" if near else ""
+
+
+def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
+    """The sentences of one recording's numbers, `(W,)`, the severe ones first."""
+    found = []
+    for kind, value in zip(KINDS, np.asarray(values, float), strict=True):
+        if np.isnan(value):
+            continue
+        text = kind.text.format(value=float(value), guess=_guess(float(value)), **units)
+        found.append(Remark(kind.name, text, kind.severe))
+    return tuple(sorted(found, key=lambda remark: not remark.severe))

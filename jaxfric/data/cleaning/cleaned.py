@@ -1,0 +1,122 @@
+"""A log put in order, or only made fit to compute with."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import clock
+from .filtered import filtered_seams
+from .missing import missing_rows
+from .pieces import borders, note, runs
+from .wraps import check_period, unwrap
+
+# Below this no fit of even the smallest model (three parameters a direction) has samples to spare.
+MIN_SAMPLES = 16
+
+
+class Clean(NamedTuple):
+    """Signals without faults: all arrays of shape `(N,)`; `notes` says what was done."""
+
+    signals: dict[str, np.ndarray]
+    mask: np.ndarray
+    segment: np.ndarray
+    notes: list[str]
+
+
+def clean(
+    signals: dict[str, np.ndarray],
+    segment: np.ndarray | None,
+    rows: np.ndarray,
+    source: str,
+    period: float | None = None,
+    repair: bool = True,
+) -> Clean:
+    """Put a log in order: clock, interruptions, invalid samples, wrapped position.
+
+    **Arguments:** `signals`, role to float64 array of shape `(N,)`, with `time` in s; `segment`,
+    labels of any kind whose changes start a new segment, or `None`; `rows`, the rows of the
+    samples as a person counts, for the notes; `source`, for messages; `period`, the modulus of
+    the position, where stated; without `repair` only samples that cannot be computed with are
+    masked, and a stated period is heeded.
+
+    **Raises:** `ValueError` if the clock does not run or too few valid samples are left.
+    """
+    notes: list[str] = []
+    segment = runs(segment) if segment is not None else np.zeros(len(rows), np.int64)
+    stamped = np.isfinite(signals["time"])
+    if np.count_nonzero(stamped) < MIN_SAMPLES:
+        raise ValueError(
+            f"{source}: {np.count_nonzero(stamped)} samples have a time stamp; at least "
+            f"{MIN_SAMPLES} are needed."
+        )
+    if repair:
+        signals, segment, rows = _in_order(signals, segment, rows, stamped, notes, source)
+        mask = _mask(signals, segment, rows, notes, source)
+    else:
+        signals = _with_all_stamps(signals, segment, rows, stamped, notes, source)
+        mask = _mask(signals, segment, rows, notes, source) & stamped
+    if period is not None and "position" in signals:
+        check_period(signals["position"][mask], period, source)
+    if repair:
+        told = len(notes)
+        if period is None:
+            segment = filtered_seams(signals, mask, segment, rows, notes)
+        unwrap(signals, mask, segment, rows, notes, period, quiet=len(notes) > told)
+        segment = missing_rows(signals, mask, segment, rows, notes)
+    elif period is not None:
+        unwrap(signals, mask, segment, rows, notes, period)
+    return Clean(signals, mask, segment, notes)
+
+
+def _in_order(signals, segment, rows, stamped, notes, source):
+    """Signals, segments and rows of the samples whose time is known."""
+    note(notes, ~stamped, rows, "without a time stamp left out")
+    signals = {role: signal[stamped] for role, signal in signals.items()}
+    segment, rows = runs(segment[stamped]), rows[stamped]
+    inside, segment = clock.order(signals, segment, rows, notes, source)
+    signals = {role: signal[inside] for role, signal in signals.items()}
+    return signals, runs(segment[inside]), rows[inside]
+
+
+def _with_all_stamps(signals, segment, rows, stamped, notes, source):
+    """The signals as they are; a sample without a stamp is given one between its neighbours'."""
+    note(notes, ~stamped, rows, "without a time stamp masked")
+    clock.check_increases(signals["time"][stamped], segment[stamped], rows[stamped], source)
+    return signals | {"time": _filled(signals["time"], ~stamped, segment)}
+
+
+def _mask(signals, segment, rows, notes, source) -> np.ndarray:
+    """Mask samples without a number and fill them, so that arithmetic on them stays finite."""
+    mask = np.ones(len(rows), bool)
+    for role, signal in signals.items():
+        bad = ~np.isfinite(signal)
+        if not bad.any():
+            continue
+        if bad.all():
+            raise ValueError(
+                f"{source}: the {role} column holds no number at all. Name another column, or "
+                f"leave it out: --columns {role}=NAME or {role}= (nothing)."
+            )
+        signals[role] = _filled(signal, bad, segment)
+        if role in ("force", "position", "velocity"):
+            mask &= ~bad
+            note(notes, bad, rows, f"without a finite {role} masked")
+        else:  # a slow sensor that is logged at every tenth sample says nothing about the motion
+            note(notes, bad, rows, f"without a finite {role} interpolated")
+    if np.count_nonzero(mask) < MIN_SAMPLES:
+        raise ValueError(
+            f"{source}: {np.count_nonzero(mask)} valid samples are left after the clean-up; at "
+            f"least {MIN_SAMPLES} are needed. {' '.join(notes)}".rstrip()
+        )
+    return mask
+
+
+def _filled(signal: np.ndarray, bad: np.ndarray, segment: np.ndarray) -> np.ndarray:
+    """Interpolated between valid neighbours of the same segment, or of any where it has none."""
+    index = np.arange(len(signal))
+    result = np.where(bad, np.interp(index, index[~bad], signal[~bad]), signal)
+    for part in np.split(index, borders(segment)):
+        good = part[~bad[part]]
+        if 0 < len(good) < len(part):
+            result[part] = np.interp(part, good, signal[good])
+    return result

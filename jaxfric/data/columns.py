@@ -1,0 +1,251 @@
+"""Which column of a file is which signal: names to roles, and the units that names state.
+
+Nothing is guessed: a name either is a usual synonym of one role or is left alone, two candidates
+for a role are an error, and a unit in a name is reported or refused but never converted.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+
+from .printable import listed
+from .spellings import FITTING, spelt, unit_of
+
+ROLES = (
+    "time", "position", "velocity", "force", "reference", "load", "temperature", "segment"
+)  # fmt: skip
+
+# `time_stamp`, `TimeStamp` and `time stamp` are all `timestamp`; symbols are taken to the letter,
+# for `qd` is a velocity in most logs but `q_d` is a desired position in some.
+_SYNONYMS = {
+    "time": "time times t timestamp tstamp elapsed elapsedtime seconds sec",
+    "position": "position pos q qm q_m x angle theta displacement encoder enc qpos jointangle "
+    "angularposition rotorposition",
+    "velocity": "velocity vel v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
+    "angularvelocity angularspeed thetadot dtheta rpm",
+    "force": "force torque tau current u vir effort moment thrust f i iq i_q qaxiscurrent "
+    "controleffort",
+    "reference": "reference ref qg qref xref qdes xdes rposition",
+    "load": "load payload loadmass normalload externalload",
+    "temperature": "temperature temp",
+    "segment": "segment seg segmentid segmentindex run runid trial episode",
+}
+_ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
+_MEASURED = frozenset("measured meas actual act feedback fb motor joint axis drive".split())
+_WANTED = frozenset(
+    "desired des reference ref setpoint sp set command commanded cmd target demand goal".split()
+)
+
+_BRACKETS = re.compile(r"[\[({]([^\])}]*)[\])}]")
+_SECONDS = {"ms": "0.001", "µs": "1e-06", "ns": "1e-09", "min": "60", "h": "3600"}
+# What stands in a bracket beside units: which signal it is.
+_REMARK = re.compile(
+    r"^(?:|\d+|[a-z]|(?:axis|joint|motor|drive|link)?[ _-]?\w?\d*|(?:low)?[ _-]?(?:pass)?filtered|"
+    r"raw|smoothed|est(?:imated)?|abs(?:olute)?|rel(?:ative)?)$"
+)
+
+
+def _words(name: str) -> list[str]:
+    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.rsplit(".", 1)[-1])
+    return [word for word in re.split(r"[^0-9a-zµμ°%]+", name.lower()) if word]
+
+
+def _plain_role(words: list[str]) -> str | None:
+    joined = "".join(words)
+    return _ROLE_OF.get("_".join(words)) or (_ROLE_OF.get(joined) if len(joined) > 5 else None)
+
+
+def _role_of_words(words: list[str]) -> str | None:
+    """The role of a name without unit; what is *wanted* is a reference or nothing."""
+    if (role := _plain_role(words)) is not None:
+        return role
+    if any(word in _WANTED for word in words):
+        rest = [word for word in words if word not in _WANTED]
+        return "reference" if rest and _role_of_words(rest) == "position" else None
+    kept = [word for word in words if word not in _MEASURED]
+    return _plain_role(kept) if len(kept) < len(words) else None
+
+
+def describe(name: str) -> tuple[str | None, str | None]:
+    """The role that a column's name stands for and the unit that it states, each or `None`."""
+    bracket = _BRACKETS.search(name)
+    words = _words(_BRACKETS.sub(" ", name))
+    if (role := _role_of_words(words)) is not None:
+        stated = bracket[1] if bracket else "rpm" if words[-1:] == ["rpm"] else ""
+        return role, unit_of(stated, role)
+    for tail in (1, 2, 3):
+        role = _role_of_words(words[:-tail]) if len(words) > tail else None
+        unit = unit_of("_".join(words[-tail:]), role) if role else None
+        if unit and words[-1] != "in":  # `position_in` is rather an input than in inches
+            return role, unit
+    return None, None
+
+
+def stated_unit(name: str, role: str) -> str | None:
+    """The unit that the name of a role's column states, or `None`.
+
+    A column that is given a role may be called anything: then a bracket states a unit, and a tail
+    of more than one letter (`foo_rpm`; `axis_a` is hardly in ampere).
+    """
+    own, unit = describe(name)
+    if own == role:
+        return unit
+    if bracket := _BRACKETS.search(name):
+        return unit_of(bracket[1], role)
+    words = _words(name)
+    tails = ("_".join(words[-tail:]) for tail in (3, 2, 1) if len(words) > tail)
+    return next((u for t in tails if len(t) > 1 and (u := unit_of(t, role))), None)
+
+
+def unknown_units(chosen: Mapping[str, str], scale: Mapping[str, float]) -> list[str]:
+    """A sentence for each bracket in the name of a needed column that is no unit of it."""
+    sentences = []
+    for role, name in chosen.items():
+        bracket = _BRACKETS.search(name)
+        if role not in FITTING or scale.get(role) is not None or not bracket:
+            continue
+        text = bracket[1].strip()
+        if unit_of(text, role) is not None or (spelt(text, role) is None and _is_remark(text)):
+            continue
+        fault = f"is no unit of {role}" if spelt(text, role) else "is not known"
+        sentences.append(
+            f"Warning: the unit [{text}] of column {name!r} {fault}; the numbers are taken as "
+            f"{_TAKEN[role]}. If they are not: --scale {role}=FACTOR."
+        )
+    return sentences
+
+
+def _is_remark(text: str) -> bool:
+    """Whether a bracket says which signal it is, not in which unit."""
+    return bool(_REMARK.match(text.lower())) or set(_words(text)) <= _MEASURED | _WANTED
+
+
+# What numbers without a stated unit are.
+_TAKEN = {
+    "time": "s",
+    "position": "they are",
+    "reference": "being in the unit of the position",
+    "velocity": "the unit of the position per second",
+    "force": "they are",
+}
+
+
+def assign(
+    names: Iterable[str],
+    columns: Mapping[str, str | None] | None,
+    source: str,
+    set_point: bool = False,
+) -> dict[str, str]:
+    """Role to column name: what the user says first, then the usual synonyms.
+
+    **Arguments:** `names`, the columns that the file has; `columns`, role to column name as
+    given by the user, where an empty name leaves the role out; `source`, for messages;
+    `set_point`, whether the time and a reference, a position or a force are enough.
+
+    **Raises:** `ValueError` if a named column is absent, if two columns stand for one role, or
+    if time, force, or both position and velocity are missing.
+    """
+    names, columns = list(names), dict(columns or {})
+    chosen = {role: _find(names, name, role, source) for role, name in columns.items() if name}
+    candidates: dict[str, list[str]] = {}
+    for name in names:
+        role = describe(name)[0]
+        if role and role not in columns and name not in chosen.values():
+            candidates.setdefault(role, []).append(name)
+    for role, found in candidates.items():
+        if len(found) > 1:
+            raise ValueError(
+                f"{source}: {len(found)} columns could be the {role}: {listed(found)}. "
+                f"Say which: --columns {role}={found[0]} (columns={{{role!r}: {found[0]!r}}})."
+            )
+        chosen[role] = found[0]
+    if set_point and "time" in chosen and {"reference", "position", "force"} & set(chosen):
+        return chosen
+    _check_needed(chosen, names, source)
+    return chosen
+
+
+def _find(names: list[str], name: str, role: str, source: str) -> str:
+    if name in names:
+        return name
+    alike = [other for other in names if other.strip().lower() == name.strip().lower()]
+    if len(alike) == 1:
+        return alike[0]
+    raise ValueError(
+        f"{source}: there is no column {name!r} for the {role}. The columns are: {listed(names)}."
+    )
+
+
+def _check_needed(chosen: Mapping[str, str], names: list[str], source: str) -> None:
+    missing = [role for role in ("time", "force") if role not in chosen]
+    if "position" not in chosen and "velocity" not in chosen:
+        missing.append("position")
+    if missing:
+        wanted = ["position or velocity" if role == "position" else role for role in missing]
+        example = ",".join(f"{role}=NAME" for role in missing)
+        raise ValueError(
+            f"{source}: no column is recognised as {' nor as '.join(wanted)}. The columns are: "
+            f"{listed(names)}. Name them: --columns {example}."
+        )
+
+
+def check_per_second(chosen: Mapping[str, str], scale: Mapping[str, float], source: str) -> None:
+    """Refuse a clock that is not in seconds, and a velocity that is not position per second.
+
+    Only names that state a unit are judged, and a role with a `scale` is the user's own word.
+
+    **Raises:** `ValueError` with the factor to give.
+    """
+    stated = {r: stated_unit(name, r) for r, name in chosen.items() if scale.get(r) is None}
+    time = stated.get("time")
+    if time in _SECONDS:
+        raise ValueError(
+            f"{source}: the column {chosen['time']!r} says that time is in {time}, but time must "
+            f"be in s. Give the factor: --scale time={_SECONDS[time]} (or time=1 if it is in s)."
+        )
+    velocity, position = stated.get("velocity"), stated.get("position")
+    if velocity == "rpm":
+        raise ValueError(
+            f"{source}: the column {chosen['velocity']!r} is in rpm, but velocity must be per "
+            "second. Give the factor: --scale velocity=0.10471975512 for rad/s."
+        )
+    if velocity and velocity.endswith("/min"):
+        raise ValueError(
+            f"{source}: the column {chosen['velocity']!r} is in {velocity}, but velocity must be "
+            "per second. Give the factor: --scale velocity=0.0166666666667 (the rest of the unit "
+            "as it is)."
+        )
+    if velocity and position and velocity != f"{position}/s":
+        raise ValueError(
+            f"{source}: {chosen['velocity']!r} is in {velocity}, but {chosen['position']!r} is in "
+            f"{position}: one of them needs a factor, --scale velocity=FACTOR (or position=)."
+        )
+
+
+def units(
+    chosen: Mapping[str, str], scale: Mapping[str, float], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Names of the force and position unit: given, else stated by the columns' names, else none.
+
+    A scaled column no longer has the unit in its name. A column called torque is in N·m and one
+    called current in A unless said otherwise, and the motion that goes with a torque is an
+    angle: torque times rad/s is power.
+    """
+    found = {}
+    force, position = _stated("force", chosen, scale), _stated("position", chosen, scale)
+    if position is None and (velocity := _stated("velocity", chosen, scale)):
+        position = velocity.removesuffix("/s") if velocity.endswith("/s") else None
+    named = "force" in chosen and scale.get("force") is None  # a set-point may come without
+    words = _words(chosen["force"]) if named else []
+    if force is None:
+        force = "N·m" if "torque" in words else "A" if "current" in words else None
+    if force:
+        found["force"] = force
+    if position is None and (given.get("force") or force or "").endswith("N·m"):
+        position = None if scale.get("position") is not None else "rad"
+    if position:
+        found["position"] = position
+    return found | dict(given)
+
+
+def _stated(role: str, chosen: Mapping[str, str], scale: Mapping[str, float]) -> str | None:
+    return stated_unit(chosen[role], role) if role in chosen and scale.get(role) is None else None

@@ -1,0 +1,309 @@
+"""Delimited text to named columns: whatever delimiter, decimal sign or header loggers write."""
+
+import csv
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .printable import short
+
+# Importing pyarrow takes about as long as NumPy takes for a file of this size, so smaller files
+# are quicker without it.
+_SMALL_CSV = 5_000_000  # bytes
+_DELIMITERS = ",;\t|"
+# Ten thousand columns with names of a hundred characters.
+_LONGEST_LINE = 1_000_000
+# Numbers with a point, with a comma, and with more than a decimal sign.
+_EXPONENT = r"(?:[eE][-+]?\d+)?"
+_POINT = r"[-+]?(?:\d+\.\d*|\.\d+)" + _EXPONENT
+_COMMA = r"[-+]?(?:\d+,\d*|,\d+)" + _EXPONENT
+_SEVERAL = r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,})"
+# Groups of three digits, as commas separate thousands; all others with a comma have decimals.
+_DECIMAL = r"[-+]?(?:0\d*,\d*|\d{4,},\d*|\d*,(?:\d{0,2}|\d{4,}))" + _EXPONENT
+_NO_NUMBER = {"", "na", "n/a", "#n/a", "null", "none", "-", "nan(ind)", "-nan(ind)"}
+
+
+class Table(NamedTuple):
+    """Raw columns by name, the row number of the first sample as a person counts, and notes."""
+
+    columns: dict[str, np.ndarray]
+    first_row: int
+    notes: list[str]
+
+
+class _Dialect(NamedTuple):
+    header: list[str]
+    first: int  # lines before the first sample
+    delimiter: str | None  # None: blanks
+    decimal: str
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return line.split()
+    # A quotation mark that stays open is found where the rows are read.
+    with suppress(csv.Error):
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    return [cell.strip() for cell in line.split(delimiter)]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _dialect(lines: list[str], path: Path) -> _Dialect:
+    """Header, delimiter and decimal sign, from the first lines; `#` starts a comment."""
+    rows = [i for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    if not rows:
+        raise ValueError(f"{path}: the file holds no samples.")
+    top = lines[rows[0]]
+    if len(top) > _LONGEST_LINE:
+        raise ValueError(
+            f"{path}: row {rows[0] + 1} has {len(top)} characters, more than any row of a log. Is "
+            "this text, with a line for each sample?"
+        )
+    delimiter = max(_DELIMITERS, key=top.count)
+    delimiter = delimiter if delimiter in top else None
+    cells = _split(top, delimiter)
+    data = rows[1] if len(rows) > 1 else rows[0]
+    number = re.compile(r"^\s*[-+]?\d+,\d+")
+    decimal = "," if delimiter in (";", "\t", None) and any(
+        number.match(cell) for cell in _split(lines[data], delimiter)
+    ) else "."  # fmt: skip
+    if not all(_is_number(cell) for cell in cells):
+        return _Dialect(unique(cells), rows[0] + 1, delimiter, decimal)
+    comment = lines[rows[0] - 1].lstrip("# ") if rows[0] else ""
+    header = _split(comment, delimiter)
+    if len(header) != len(cells):
+        header = [f"column{i + 1}" for i in range(len(cells))]
+    return _Dialect(unique(header), rows[0], delimiter, decimal)
+
+
+def unique(names: list[str]) -> list[str]:
+    """Names with repeats numbered, `x` and `x (2)`: as synonyms they stay ambiguous."""
+    seen: dict[str, int] = {}
+    result = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        result.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return result
+
+
+def _decode(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")  # what measuring programs under Windows write for ° and µ
+
+
+def read_csv(path: Path) -> Table:
+    """The columns of a delimited text file.
+
+    **Raises:** `ValueError` if it holds no samples or its rows differ in width.
+    """
+    raw = path.read_bytes()
+    end = raw.rfind(b"\n", 0, 65536) + 1
+    dialect = _dialect(_decode(raw[:end] if end else raw).splitlines(), path)
+    lines: list[str] | None = None
+    notes: list[str] = []
+    if dialect.delimiter != "," and b"," in raw:  # a quoted cell with one is located as no number
+        lines = _decode(raw).splitlines()[dialect.first :]
+        decimal, notes = _signs(lines, dialect, path)
+        dialect = dialect._replace(decimal=decimal)
+    table = None
+    if len(raw) > _SMALL_CSV and dialect.delimiter and not _open_quotation(raw):
+        table = _arrow_csv(raw, dialect)
+    if table is None:
+        lines = _decode(raw).splitlines()[dialect.first :] if lines is None else lines
+        table = _plain_csv(lines, dialect, path)
+    return table._replace(notes=notes + table.notes)
+
+
+def _open_quotation(raw: bytes) -> bool:
+    """Whether a quotation mark is open at the end of a line, where pyarrow drops the rest."""
+    return b'"' in raw and any(line.count(b'"') % 2 for line in raw.splitlines())
+
+
+def _arrow_csv(raw: bytes, dialect: _Dialect) -> Table | None:
+    """A large file by pyarrow; `None` where that is absent or the plain reader must explain."""
+    try:
+        import pyarrow as pa
+        from pyarrow import csv as arrow_csv
+    except ImportError:
+        return None
+    try:
+        table = arrow_csv.read_csv(
+            pa.BufferReader(raw),
+            arrow_csv.ReadOptions(skip_rows=dialect.first, column_names=dialect.header),
+            arrow_csv.ParseOptions(delimiter=dialect.delimiter),
+            arrow_csv.ConvertOptions(decimal_point=dialect.decimal),
+        )
+    except pa.ArrowInvalid:
+        return None
+    columns = {name: arrow_column(table[name]) for name in table.column_names}
+    return Table(columns, dialect.first + 1, [])
+
+
+def _plain_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        raise ValueError(f"{path}: the file has a header but no samples.")
+    return _regular_csv(lines, dialect) or _any_csv(lines, dialect, path)
+
+
+def _signs(lines: list[str], dialect: _Dialect, path: Path) -> tuple[str, list[str]]:
+    """The decimal sign, and a warning where each comma could as well separate thousands.
+
+    **Raises:** `ValueError` if commas and points are both used inside numbers: which of them is
+    the decimal sign is not guessed.
+    """
+    text = "\n".join(lines)
+
+    def first(number: str) -> tuple[str, str] | None:
+        """The first cell that is such a number, and its row."""
+        between = "[ \t]" if dialect.delimiter is None else f"[{re.escape(dialect.delimiter)}]"
+        found = re.search(f'(?m)(?:^|{between})[ "]*({number})[ "]*(?={between}|$)', text)
+        row = dialect.first + 1 + text.count("\n", 0, found.start(1)) if found else 0
+        return (found[1], f"row {row}") if found else None
+
+    point = first(_POINT) if "." in text else None
+    comma = first(_COMMA)
+    several = first(_SEVERAL) if re.search(r"\d[.,]\d{3}[.,]", text) else None
+    if several or (point and comma):
+        cell, row = several or comma
+        other = (comma if several else None) or point
+        beside = f" beside {other[0]!r} in {other[1]}" if other else ""
+        raise ValueError(
+            f"{path}: {row}: {cell!r}{beside}: the comma may separate thousands or be the decimal "
+            "sign. Write the file with one decimal sign and no separator of thousands."
+        )
+    if comma and not first(_DECIMAL):
+        return ",", [
+            f"Warning: the comma is taken for the decimal sign ({comma[0]!r} in {comma[1]}), "
+            "though every number with one could be a whole number with separated thousands; if "
+            "it is, write the file without them."
+        ]
+    return "," if comma else ".", []
+
+
+def _regular_csv(lines: list[str], dialect: _Dialect) -> Table | None:
+    """A file of nothing but numbers, quickly; `None` where it is anything else."""
+    if dialect.decimal == ",":
+        lines = [line.replace(",", ".") for line in lines]
+    try:
+        values = np.loadtxt(lines, delimiter=dialect.delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    if values.shape != (len(lines), len(dialect.header)):
+        return None
+    return Table(dict(zip(dialect.header, values.T, strict=True)), dialect.first + 1, [])
+
+
+def _any_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
+    width, notes = len(dialect.header), []
+    if dialect.delimiter is None:
+        rows = [line.split() for line in lines]
+    else:
+        rows = _quoted(lines, dialect, path)
+    if len(rows[-1]) < width:
+        notes.append(f"The last row has {len(rows[-1])} of {width} fields and is left out.")
+        rows.pop()
+    if any(len(row) != width for row in rows):
+        rows = [_fit(row, width, i + dialect.first + 1, path) for i, row in enumerate(rows)]
+    if not rows:
+        raise ValueError(f"{path}: the file has a header but no samples.")
+    cells = zip(dialect.header, zip(*rows, strict=True), strict=True)
+    columns = {name: _parse(column, dialect.decimal) for name, column in cells}
+    return Table(columns, dialect.first + 1, notes)
+
+
+def _quoted(lines: list[str], dialect: _Dialect, path: Path) -> list[list[str]]:
+    """The cells of each line.
+
+    **Raises:** `ValueError` where a quotation mark is open at the end of a line: what would be one
+    cell may be half of the file.
+    """
+    # The end of a line shows whether a quotation mark is open there.
+    ended = (f"{line}\n" for line in lines)
+    reader = csv.reader(ended, delimiter=dialect.delimiter, skipinitialspace=True)
+    rows: list[list[str]] = []
+    try:
+        for row in reader:
+            if reader.line_num > len(rows) + 1 or (row and row[-1].endswith("\n")):
+                raise csv.Error
+            rows.append(row)
+    except csv.Error:  # also a cell that is longer than any
+        raise ValueError(
+            f"{path}: row {dialect.first + len(rows) + 1}: a quotation mark is opened and not "
+            "closed in that line. Correct or remove the line."
+        ) from None
+    return rows
+
+
+def _fit(row: list[str], width: int, number: int, path: Path) -> list[str]:
+    if not row or (len(row) == 1 and not row[0].strip()):
+        return [""] * width  # a blank line: no time stamp, so the sample is left out later
+    if len(row) > width and not any(row[width:]):
+        return row[:width]
+    if len(row) != width:
+        raise ValueError(
+            f"{path}: row {number} has {len(row)} fields where the header has {width}. "
+            "Correct or remove that line."
+        )
+    return row
+
+
+def _parse(cells: tuple[str, ...], decimal: str) -> np.ndarray:
+    """Numbers where all cells are numbers, else the cells as they stand."""
+    if decimal == ",":
+        cells = tuple(cell.replace(",", ".") for cell in cells)
+    try:
+        return np.array(cells, dtype=np.float64)
+    except ValueError:
+        return np.array(cells, dtype=object)
+
+
+def numbers(column: np.ndarray, name: str, path: Path, first_row: int) -> np.ndarray:
+    """A column as float64; empty cells and the usual words for "no value" become NaN.
+
+    **Raises:** `ValueError` naming the file, row, column and value of the first text.
+    """
+    if column.dtype.kind in "biuf":
+        return column.astype(np.float64)
+    result = np.empty(len(column))
+    for i, cell in enumerate(column):
+        text = "" if cell is None else str(cell).strip()
+        try:
+            result[i] = np.nan if text.lower() in _NO_NUMBER else float(text)
+        except ValueError:
+            raise ValueError(
+                f"{path}: row {first_row + i}, column {short(name)!r}: {short(text)!r} is not a "
+                "number. Correct the cell, or name another column with --columns."
+            ) from None
+    return result
+
+
+def arrow_column(column: Any) -> np.ndarray:
+    """A column of an Arrow table as numbers, moments, or objects where it is text."""
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_integer(kind) and column.null_count == 0:
+        return column.to_numpy()
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+        return column.cast(pa.float64()).to_numpy()
+    if pa.types.is_boolean(kind):
+        return column.cast(pa.int8()).cast(pa.float64()).to_numpy()
+    if pa.types.is_timestamp(kind):
+        return column.to_numpy()
+    if pa.types.is_null(kind):
+        return np.full(len(column), np.nan)
+    return np.array(column.to_pylist(), dtype=object)

@@ -1,0 +1,185 @@
+"""Files to recordings: `read`; and what writes results to files."""
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import jax
+import numpy as np
+
+from . import columns as names, stamps
+from .cleaning import clean
+from .delimited import Table, numbers
+from .printable import encodable
+from .recording import Recording
+from .tables import load
+from .writing import (
+    write_bytes as write_bytes,
+    write_table as write_table,
+    write_text as write_text,
+)
+
+_SIGNALS = ("time", "force", "position", "velocity")
+
+
+def read(
+    path: str | os.PathLike,
+    *,
+    columns: Mapping[str, str | None] | None = None,
+    scale: Mapping[str, float] | None = None,
+    units: Mapping[str, str] | None = None,
+    format: str | None = None,
+    period: Mapping[str, float] | None = None,
+    repair: bool = True,
+) -> Recording:
+    """Read one log: CSV, Parquet, MATLAB `.mat` or NumPy `.npz`.
+
+    What was put in order on the way (interruptions, invalid samples, a wrapped position) is told
+    by [`read_with_notes`][], with what each repair changed and by how much.
+
+    **Arguments:**
+
+    - `columns`: role to column name, where names do not speak for themselves; roles beyond the
+      usual ones (`time`, `position`, `velocity`, `force`, `reference`, `load`, `temperature`,
+      `segment`) become channels; an empty name leaves a role out.
+    - `scale`: role to factor, for instance `{"position": 0.001}` for millimetres to metres.
+    - `units`: names of the force and the position unit after scaling, `{"force": "N·m"}`.
+    - `format`: `csv`, `parquet`, `mat` or `npz`, where the suffix does not say.
+    - `period`: what the position is counted modulo, as the column counts it, before any scale:
+      `{"position": 360}`. It is then made continuous. Without it that is done only where it is
+      certain.
+    - `repair`: with `False` all samples stay as they are, but for those that cannot be computed
+      with: what is not finite is masked, and stamps that do not increase are an error.
+
+    **Returns:** a `Recording` with signals of shape `(N,)`, in jax's default float type.
+
+    **Raises:** `ValueError` naming file, place, fault and remedy.
+    """
+    return read_with_notes(
+        path,
+        columns=columns,
+        scale=scale,
+        units=units,
+        format=format,
+        period=period,
+        repair=repair,
+    )[0]
+
+
+def read_with_notes(
+    path: str | os.PathLike,
+    *,
+    columns: Mapping[str, str | None] | None = None,
+    scale: Mapping[str, float] | None = None,
+    units: Mapping[str, str] | None = None,
+    format: str | None = None,
+    period: Mapping[str, float] | None = None,
+    repair: bool = True,
+    set_point: bool = False,
+) -> tuple[Recording, list[str]]:
+    """[`read`][] together with one plain sentence for each thing that was put in order.
+
+    With `set_point` the file may hold what an axis should do instead of what it did: time and a
+    reference, a position or a force are enough, and a force that is absent is zero.
+
+    Row numbers in the notes count lines in a CSV file and samples, from 1, in the other formats.
+    """
+    path, source = Path(path), encodable(os.fspath(path))
+    scale, units, period = dict(scale or {}), dict(units or {}), dict(period or {})
+    table = load(path, format)
+    chosen = names.assign(table.columns, columns, source, set_point)
+    _check_arguments(chosen, scale, units, period, source)
+    names.check_per_second(chosen, scale, source)
+    notes = table.notes + names.unknown_units(chosen, scale)
+    signals = {
+        role: numbers(table.columns[name], name, path, table.first_row)
+        for role, name in chosen.items()
+        if role not in ("segment", "time")
+    }
+    signals = {"time": _time(table, chosen, scale, notes, path)} | signals
+    segment = table.columns[chosen["segment"]] if "segment" in chosen else None
+    _check_lengths(signals, segment, chosen, source)
+    rows = np.arange(len(signals["time"])) + table.first_row
+    tidy = clean(signals, segment, rows, source, period.get("position"), repair)
+    scaled = {role: signal * scale.get(role, 1.0) for role, signal in tidy.signals.items()}
+    if set_point:
+        scaled.setdefault("force", np.zeros_like(scaled["time"]))
+        if not {"position", "velocity"} & set(scaled):
+            scaled["position"] = scaled.get("reference", np.zeros_like(scaled["time"]))
+    notes += tidy.notes
+    scaled["time"] = _exact_time(scaled["time"], tidy.segment, notes, source)
+    recording = Recording(
+        **{role: scaled[role] for role in _SIGNALS if role in scaled},
+        mask=tidy.mask,
+        segment=tidy.segment,
+        channels={role: scaled[role] for role in scaled if role not in _SIGNALS},
+        units=tuple(names.units(chosen, scale, units).items()),
+        source=source,
+    )
+    return recording, notes
+
+
+def _check_arguments(chosen, scale, units, period, source) -> None:
+    for role, factor in scale.items():
+        if role not in chosen or role == "segment":
+            raise ValueError(
+                f"{source}: scale names {role!r}, which is not read. Read are {', '.join(chosen)}."
+            )
+        if not math.isfinite(factor) or factor == 0 or (role == "time" and factor < 0):
+            raise ValueError(f"{source}: the scale of {role} is {factor}; give a usual number.")
+    for role, turn in period.items():
+        if role != "position" or "position" not in chosen:
+            there = "position" if "position" in chosen else "none, for no position is read"
+            raise ValueError(f"{source}: period names {role!r}; what can have one: {there}.")
+        if not (math.isfinite(turn) and turn > 0):
+            raise ValueError(f"{source}: the period of {role} is {turn}; give a number over zero.")
+    if unknown := set(units) - {"force", "position"}:
+        raise ValueError(
+            f"{source}: units names {', '.join(sorted(unknown))}; only the force and the position "
+            "have a unit to name, the others follow from them and the second."
+        )
+
+
+def _time(table: Table, chosen, scale, notes: list[str], path: Path) -> np.ndarray:
+    """The time column, in s unless a scale is given."""
+    column = table.columns[chosen["time"]]
+    if (dated := stamps.moments(column)) is not None:
+        return dated
+    if "time" not in scale:  # a factor is the user's own word
+        if column.dtype.kind == "O":
+            column = numbers(column, chosen["time"], path, table.first_row)
+        told = len(notes)
+        column = stamps.since_1970(column, notes)
+        if len(notes) == told and names.stated_unit(chosen["time"], "time") != "s":
+            stamps.check_slow(column, notes)
+    return numbers(column, chosen["time"], path, table.first_row)
+
+
+def _check_lengths(signals, segment, chosen, source) -> None:
+    lengths = {role: len(signal) for role, signal in signals.items()}
+    if segment is not None:
+        lengths["segment"] = len(segment)
+    if len(set(lengths.values())) > 1:
+        listed = ", ".join(f"{chosen[role]} ({role}) {n}" for role, n in lengths.items())
+        raise ValueError(
+            f"{source}: the columns differ in length: {listed}. Name columns of one log with "
+            "--columns."
+        )
+
+
+def _exact_time(time, segment, notes, source) -> np.ndarray:
+    """Time that jax's default float type can hold, from zero where the origin costs digits."""
+    kind = np.dtype(jax.dtypes.canonicalize_dtype(np.float64))
+    inside = np.diff(segment) == 0
+    usual = np.median(np.diff(time)[inside])
+    # A stamp that is rounded by 1 % of a step puts as much error on a derived velocity.
+    if np.spacing(np.abs(time).max().astype(kind)) > 0.01 * usual and time.min() != 0:
+        notes.append(f"Time is counted from its first value, {time.min():.10g} s.")
+        time = time - time.min()
+    if not np.all(np.diff(time.astype(kind))[inside] > 0):
+        raise ValueError(
+            f"{source}: {kind.name} is too coarse for this clock. Switch on 64 bits before "
+            'reading: jax.config.update("jax_enable_x64", True).'
+        )
+    return time

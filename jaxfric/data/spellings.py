@@ -1,0 +1,82 @@
+"""How loggers spell units, in English and German, and which unit fits which signal."""
+
+import re
+
+# Spelling in a name -> the name of the unit. Letters that are synonyms (`s` alone) still match
+# as words, because a unit is only taken off where something is left in front of it.
+_SPELLINGS = {
+    "s": "s sec secs second seconds sek sekunde sekunden",
+    "ms": "ms msec msecs milli millis millisec millisecond milliseconds millisekunde "
+    "millisekunden",
+    "µs": "us µs μs usec usecs µsec μsec micros microsec microsecond microseconds mikrosekunde "
+    "mikrosekunden",
+    "ns": "ns nsec nanos nanosec nanosecond nanoseconds nanosekunde nanosekunden",
+    "min": "min mins minute minutes minuten", "h": "h hr hrs hour hours stunde stunden",
+    "m": "m meter meters metre metres", "cm": "cm zentimeter centimeter centimeters centimetre "
+    "centimetres", "mm": "mm millimeter millimeters millimetre millimetres",
+    "µm": "um µm μm micron microns mikrometer micrometer micrometers micrometre micrometres",
+    "nm": "nm nanometer nanometers nanometre nanometres", "km": "km kilometer kilometre",
+    "in": "in inch inches zoll", "ft": "ft foot feet",
+    "rad": "rad rads radian radians radiant bogenmaß",
+    "mrad": "mrad milliradian milliradians", "deg": "deg degs ° degree degrees",
+    "rev": "rev revs revolution revolutions turn turns umdr umdr. umdrehung umdrehungen",
+    "counts": "counts count cts cnt cnts inc incs increment increments ink inkr inkrement "
+    "inkremente tick ticks pulse pulses",
+    "N": "n newton newtons", "kN": "kn kilonewton", "mN": "mn millinewton", "lbf": "lbf lb lbs",
+    "kgf": "kgf kp", "A": "a amp amps ampere amperes arms apk", "mA": "ma milliamp milliamps "
+    "milliampere", "V": "v volt volts", "mV": "mv millivolt millivolts",
+    "N·m": "n·m n*m n.m n-m n_m n⋅m newtonmeter newtonmeters newtonmetre newtonmetres",
+    "mN·m": "mnm mn·m mn*m", "µN·m": "unm µnm μnm", "kN·m": "knm kn·m kn*m",
+    "N·cm": "ncm n·cm n*cm", "lbf·ft": "lbf·ft lbf*ft lbfft ftlb ft-lb ftlbf", "lbf·in": "lbf·in "
+    "lbf*in lbfin inlb in-lb inlbf", "%": "% percent prozent", "‰": "‰ permille promille",
+    "rpm": "rpm upm 1/min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min umdrehungen/min r/min "
+    "rev/min revs/min revolutions/min 1/minute u_min umdr_min r_min rev_min 1_min",
+    "m/s": "mps", "rev/s": "hz rps u/s umdr/s",
+}  # fmt: skip
+_UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
+_UNITS["n m"] = "N·m"
+_PER_SECOND = re.compile(
+    r"^(.+?)(?:/(?:s|sec|second|sek|sekunde)|[_ ·*]?s(?:\^?-1|⁻¹)|[_ ]per[_ ]s(?:ec|econd)?|_s|ps)$"
+)
+_PER_MINUTE = re.compile(
+    r"^(.+?)(?:/min(?:ute)?|[_ ·*]?min(?:\^?-1|⁻¹)|[_ ]per[_ ]min(?:ute)?|_min)$"
+)
+
+_LENGTHS = {
+    "m", "mm", "µm", "nm", "cm", "km", "in", "ft", "rad", "mrad", "deg", "rev", "counts"
+}  # fmt: skip
+FITTING = {
+    "time": {"s", "ms", "µs", "ns", "min", "h"},
+    "position": _LENGTHS,
+    "reference": _LENGTHS,
+    "velocity": {f"{length}/{per}" for length in _LENGTHS for per in ("s", "min")} | {"rpm"},
+    "force": {"N", "kN", "mN", "MN", "lbf", "kgf", "A", "mA", "V", "mV", "%", "‰"}
+    | {f"{prefix}N·m" for prefix in ("", "m", "µ", "k", "M")}
+    | {"N·cm", "lbf·ft", "lbf·in"},
+}
+
+
+def unit_of(text: str, role: str) -> str | None:
+    """The unit that a suffix or a bracket spells, or `None` where it is none that fits the role."""
+    unit = spelt(text, role)
+    return unit if unit in FITTING.get(role, (unit,)) else None
+
+
+def spelt(text: str, role: str) -> str | None:
+    """As [`unit_of`][]; `nm` is newton metre on a force and nanometre on a position."""
+    raw, text = text.strip(), text.strip().lower()
+    if text == "nm" and role == "force":
+        return "N·m"
+    if role == "force" and raw in ("MN", "MNm"):
+        return {"MN": "MN", "MNm": "MN·m"}[raw]
+    if raw == "Grad":  # German for degree; in English a gradian, which nobody logs in a capital
+        return "deg"
+    if text in _UNITS:
+        return _UNITS[text]
+    for pattern, per in ((_PER_SECOND, "s"), (_PER_MINUTE, "min")):
+        found = pattern.match(text)
+        inner = "deg" if found and raw.startswith("Grad") and found[1] == "grad" else None
+        inner = inner or (_UNITS.get(found[1]) if found else None)
+        if inner:
+            return f"{inner}/{per}"
+    return None

@@ -1,0 +1,229 @@
+"""What no axis does: inertia or friction that drives it, a force that has nothing to do with it."""
+
+from typing import Any
+
+import numpy as np
+
+from .. import terms as laws
+from ..checks import Remark
+from ..identification.uncertainty import Estimate
+from ..terms.base import summands
+from .evidence import NODES, Evidence
+from .intervals import covariance
+from .question import Question
+from .regression import Fit
+
+# A remark by which the baseline is what is reported.
+NOT_BETTER = "not_better"
+# Standard errors in half a 95 % interval, as in the findings' sentences.
+HALF_WIDTH = 2.0
+# More than half of the force's power: the model is further from the force than no force at all is
+# from what it leaves.
+UNDESCRIBED = 0.5
+
+
+def drives(now: Fit, evidence: Evidence, block: np.ndarray) -> bool:
+    """Whether friction drives the axis instead of braking it, beyond its interval.
+
+    Half the difference of the mean friction forward and backward, by the speeds that were seen:
+    a constant load, which terms that know the direction take up, cancels. The slower and the
+    faster half each count, since a line through both may be negative where nothing moved.
+    """
+    places = _friction(now)
+    if not places:
+        return False
+    matrix = covariance(now, block)
+    speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
+    slow = speed <= np.median(speed)
+    alpha = np.concatenate(now.alphas)
+    for half in (slow, ~slow):
+        forward, backward = half & (evidence.side > 0), half & (evidence.side < 0)
+        if not (forward.any() and backward.any()):
+            continue
+        weights = np.zeros(len(matrix))
+        columns = now.columns[:, places]
+        weights[places] = (columns[forward].mean(axis=0) - columns[backward].mean(axis=0)) / 2
+        seen = np.flatnonzero(weights)
+        spread = matrix[np.ix_(seen, seen)]
+        if not np.isfinite(spread).all():  # what is not visible may be anything
+            continue
+        error = np.sqrt(max(float(weights[seen] @ spread @ weights[seen]), 0.0))
+        if weights[: len(alpha)] @ alpha < -HALF_WIDTH * error:
+            return True
+    return False
+
+
+def _friction(now: Fit) -> list[int]:
+    """The places, among all affine parameters, of friction as a function of velocity alone."""
+    places, start = list[int](), 0
+    leaves = (leaf for term in now.terms for leaf in summands(term))
+    for leaf in leaves:
+        if leaf.coordinates <= {"velocity"} and not isinstance(leaf, laws.Offset | laws.Inertia):
+            places += range(start, start + len(leaf.affine))
+        start += len(leaf.affine)
+    return places
+
+
+def accelerates(parameters: dict[str, Estimate]) -> bool:
+    """Whether the inertia is negative beyond its interval."""
+    inertia = parameters.get("inertia")
+    if inertia is None or not np.isfinite(inertia.standard_error):
+        return False
+    return float(inertia.value) < -HALF_WIDTH * float(inertia.standard_error)
+
+
+def _corrects(evidence: Evidence) -> bool:
+    """Whether the parameters correct another simulator's values, and so may be negative."""
+    return laws.KNOWN_FORCE in evidence.motion.channels
+
+
+def undescribed(error: float) -> bool:
+    """Whether a filtered force error leaves most of the force's power, or is no number."""
+    return not error**2 <= UNDESCRIBED
+
+
+def contradicted(asked: Question, parameters: dict[str, Estimate]) -> Remark | None:
+    """What makes force and motion of a recording contradict each other; `None` if nothing does.
+
+    **Arguments:** `parameters`, of the base, with their errors.
+    """
+    power = max(float(asked.evidence.force @ asked.evidence.force), 1e-300)
+    left = float(np.sqrt(asked.base.energy / power))
+    if undescribed(left):
+        return _late(asked, left)
+    if _corrects(asked.evidence):
+        return None
+    inertia = parameters.get("inertia")
+    unseen = inertia is None or not np.isfinite(inertia.standard_error)
+    negative = unseen or accelerates(parameters)
+    if negative and drives(asked.base, asked.evidence, asked.block):
+        return Remark(
+            "wrong_sign",
+            "The force drives the axis where it should brake it, and brakes it where it should "
+            "accelerate it: force and motion are counted in opposite directions. Turn one of them "
+            "round (--scale force=-1).",
+            True,
+        )
+    return None
+
+
+def _late(asked: Question, left: float) -> Remark | None:
+    """A force that belongs to another moment of the motion than it is written beside."""
+    found = apart(asked.evidence)
+    if found is None:
+        return None
+    time, error = found
+    which = "late" if time > 0 else "early"
+    return Remark(
+        "late_force",
+        f"The force stands {abs(time):.2g} s too {which} beside the motion: as it is, a plain axis "
+        f"leaves {left:.0%} of it, and {error:.0%} where it is taken {abs(time):.2g} s "
+        f"{'earlier' if time > 0 else 'later'}. Put both logs on one clock.",
+        True,
+    )
+
+
+def apart(evidence: Evidence) -> tuple[float, float] | None:
+    """By how much force and motion are apart, s, and the force error where they are together.
+
+    Up to an eighth of the record is tried either way. The shift has to make a passive axis, inertia
+    and friction, of what was none: less than half of the force's power is left, and less than half
+    of what was left before.
+    """
+    matrix, count = _plain_axis(evidence), evidence.nodes
+    most = count // 8
+    force = np.asarray(evidence.motion.force)[:count]
+    pads = evidence.motion.num_samples - count
+
+    def rest(shift: int) -> tuple[float, bool]:
+        """Power that is left of a force taken `shift` nodes later, in parts of its own."""
+        there = evidence.centre + shift
+        inside = (there >= NODES) & (there < count - NODES)
+        moved = np.pad(np.roll(force, -shift), (0, pads), mode="edge")
+        target = evidence.project(moved)[inside]
+        basis, triangle = np.linalg.qr(matrix[inside])
+        part = basis.T @ target
+        inertia, coulomb, viscous, _ = np.linalg.lstsq(triangle, part, rcond=None)[0]
+        # Columns of one size: friction by both of its terms.
+        passive = bool(inertia > 0 and coulomb + viscous > 0)
+        return 1 - float(part @ part) / max(float(target @ target), 1e-300), passive
+
+    before = rest(0)[0]
+    tried = {shift: rest(shift) for shift in range(-most, most + 1)}
+    able = {shift: power for shift, (power, passive) in tried.items() if passive}
+    if not able:
+        return None
+    best = min(able, key=lambda shift: able[shift])
+    if able[best] > min(UNDESCRIBED, UNDESCRIBED * before) or best == 0:
+        return None
+    spacing = float(np.median(np.diff(evidence.elapsed[:count])))
+    return best * spacing, float(np.sqrt(max(able[best], 0.0)))
+
+
+def _plain_axis(evidence: Evidence) -> np.ndarray:
+    """Inertia, Coulomb and viscous friction and a constant, columns of one size, `(J, 4)`."""
+    terms = (laws.Inertia(), laws.Coulomb(), laws.Viscous(), laws.Offset())
+    columns = [evidence.columns(term, np.zeros((1, 0)))[0, :, 0] for term in terms]
+    matrix = np.stack(columns, axis=1)
+    return matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+
+
+def doubts(now: Fit, view: Question, parameters: dict[str, Estimate], error: float) -> list[Remark]:
+    """What makes the model that is reported impossible for an axis.
+
+    **Arguments:** `now`, its fit, on the rows of `view`; `parameters` of its base, with all their
+    errors; `error`: its filtered force error.
+    """
+    remarks = []
+    wrong = ["inertia"] * accelerates(parameters)
+    wrong += ["friction"] * drives(now, view.evidence, view.block)
+    if wrong and not _corrects(view.evidence):
+        remarks.append(
+            Remark(
+                "not_passive",
+                f"{' and '.join(wrong).capitalize()} negative beyond the interval, as on no axis: "
+                "is the sign of force or motion wrong, the wrong column taken, or force and motion "
+                "written at different times?",
+                True,
+            )
+        )
+    if undescribed(error):
+        remarks.append(
+            Remark(
+                "not_described",
+                f"{_most(error)} of the force's power has nothing to do with the motion by this "
+                "model: is it the right column and the right axis, is the sensor alive, and are "
+                "force and motion on one clock?",
+                True,
+            )
+        )
+    return remarks
+
+
+def _most(error: float) -> str:
+    return f"{error**2:.0%}" if np.isfinite(error) and error < 1 else "All"
+
+
+def not_better(gone: tuple[str, ...], before: Any, spoilt: Any) -> Remark:
+    """That findings went since the model with them is worse than the baseline.
+
+    `before`, `spoilt`: the [`Errors`][jaxfric.explanation.improvement] of both.
+    """
+    names = " and ".join(name.replace("_", " ") for name in gone)
+    figures = {
+        "here": "the force error",
+        "held": "the force error on the held-out recording",
+        "filtered": "the filtered force error",
+        "filtered_held": "the filtered force error on the held-out recording",
+    }
+    which = spoilt.worse(before, 0.0)
+    changes = [
+        f"{figures[name]} from {getattr(before, name):.2%} to {getattr(spoilt, name):.2%}"
+        for name in which[:2]
+    ]
+    return Remark(
+        NOT_BETTER,
+        f"The structure that was seen has the shape of {names}, but with that the model is worse: "
+        f"it takes {' and '.join(changes)}. It is neither named nor saved.",
+        False,
+    )

@@ -1,0 +1,80 @@
+"""The force errors of an explanation: as a user gets them, and through the kernel of the rows."""
+
+from typing import Any
+
+import numpy as np
+
+from ..models import Model
+from . import parameters as spelled, verification
+from .figures import Figures
+from .improvement import Improved
+from .naming import Named
+from .predictions import with_predictions
+from .question import Question
+from .regression import Fit, fit
+
+
+def filtered_errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[str, Any]:
+    """The force errors through the kernel of the rows."""
+
+    def pair(before, after, rephased=frozenset()):
+        return {
+            "before": verification.error(first, before),
+            "after": verification.error(left.last, after, rephased),
+        }
+
+    return {
+        "force_error": pair(asked.evidence, where.evidence),
+        "holdout_force_error": asked.held and pair(asked.held, where.held, left.rephased),
+        "noise_floor": verification.noise(left.last, where.evidence.force),
+    }
+
+
+def document(
+    asked: Question, better: Improved, filtered: dict, model: Model, figures: Figures
+) -> dict:
+    """The document's errors: those of `predict` and a subtraction, and those through the kernel."""
+
+    def pair(before, after):
+        return None if before is None else {"before": before, "after": after}
+
+    before, after, reach = better.before, better.after, asked.evidence.reach
+    refitted, filtered_refitted = _refitted(asked, better, figures)
+    return {
+        "force_error": pair(before.here, after.here),
+        "holdout_force_error": pair(before.held, after.held),
+        "holdout_adjusted": _adjusted(better) if asked.held else None,
+        "holdout_refitted_error": refitted,
+        "simulation_error": None,
+        "noise_floor": figures.floor(model, 2 * reach),
+        "filtered_force_error": filtered["force_error"] | {"width": reach},
+        "filtered_holdout_force_error": filtered["holdout_force_error"],
+        "filtered_holdout_refitted_error": filtered_refitted,
+        "filtered_noise_floor": filtered["noise_floor"],
+    }
+
+
+def _refitted(asked: Question, better: Improved, figures: Figures):
+    """The baseline's errors on the held-out recording, fitted to it, where nothing was found."""
+    if asked.held is None or better.found.taken:
+        return None, None
+    seen = with_predictions(asked.held, better.first)
+    again = fit(better.first.terms, seen, better.first.betas)
+    model = spelled.model(again, asked.evidence.motion.units)
+    return figures.held(model), verification.error(again, asked.held)
+
+
+def _adjusted(better: Improved) -> dict[str, list[str]]:
+    """Findings that the held-out figures take at another phase, or leave out."""
+    where, left = better.rest
+    there = verification.carried(left.last, where.held, left.rephased)
+    start = len(left.last.terms) - len(left.taken)
+    said: dict[str, list[str]] = {"left_out": [], "rephased": []}
+    kept = {id(term): alpha for term, alpha in zip(there.terms, there.alphas, strict=True)}
+    for number, taken in enumerate(left.taken):
+        term, alpha = left.last.terms[start + number], left.last.alphas[start + number]
+        if id(term) not in kept:
+            said["left_out"].append(taken.trial.candidate.effect.name)
+        elif not np.array_equal(kept[id(term)], alpha):
+            said["rephased"].append(taken.trial.candidate.effect.name)
+    return said

@@ -1,0 +1,92 @@
+"""The force errors that a user gets: a saved model, `predict`, and a subtraction."""
+
+from collections.abc import Hashable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ..data.recording import Recording
+from ..models import Model
+from ..simulation.prediction import delay_of, in_motion, relative, residual
+
+
+def cast(tree, dtype=float):
+    """Every floating-point array in double (or another) precision; anything else as it is."""
+
+    def one(leaf):
+        inexact = eqx.is_array(leaf) and jnp.issubdtype(leaf.dtype, jnp.floating)
+        return jnp.asarray(np.asarray(leaf), dtype) if inexact else leaf
+
+    return tree if isinstance(tree, str) else jax.tree.map(one, tree)
+
+
+class Figures:
+    """Force errors of models on a recording and a held-out one, in the caller's own precision.
+
+    What is computed in double precision inside would not be what the caller reproduces.
+    """
+
+    def __init__(self, recording: Recording, holdout: Recording | None, x64: bool):
+        self.dtype, self.x64 = recording.time.dtype, x64
+        # Figures that differ by less differ by rounding.
+        self.rounding = float(np.sqrt(jnp.finfo(self.dtype).eps))
+        self._recordings = {"here": recording, "held": holdout}
+        self._moving: dict[Hashable, np.ndarray] = {}
+        self._known: dict[Hashable, np.ndarray] = {}
+
+    def own(self, model: Model) -> Model:
+        """The model in the precision of the recording."""
+        return cast(model, self.dtype)
+
+    def here(self, model: Model, delay: float | None = None) -> float:
+        """As [`force_error`][jaxfric.simulation.prediction.force_error], on the recording itself.
+
+        `delay`: that of another model, s, whose samples the figure is to be taken over.
+        """
+        return self._error(model, "here", delay)
+
+    def held(self, model: Model, delay: float | None = None) -> float:
+        """On the held-out recording, of which there has to be one."""
+        return self._error(model, "held", delay)
+
+    def _error(self, model: Model, where: str, delay: float | None) -> float:
+        moving, force = self._samples(where, delay_of(model) if delay is None else delay)
+        return relative(self._left(model, where)[moving], force[moving])
+
+    def _samples(self, where: str, delay: float) -> tuple[np.ndarray, np.ndarray]:
+        """Which samples a figure is taken over, and the force, N, both `(N,)`."""
+        recording = self._recordings[where]
+        if (where, delay) not in self._moving:
+            with jax.enable_x64(self.x64):
+                self._moving[where, delay] = in_motion(recording, delay)
+        return self._moving[where, delay], np.asarray(recording.force, float)
+
+    def _left(self, model: Model, where: str) -> np.ndarray:
+        """What a model leaves of the force, N, `(N,)`; computed once."""
+        recording = self._recordings[where]
+        leaves, structure = jax.tree.flatten(self.own(model))
+        key = where, structure, tuple(np.asarray(leaf).tobytes() for leaf in leaves)
+        if key not in self._known:
+            with jax.enable_x64(self.x64):
+                self._known[key] = residual(self.own(model), recording)
+        return self._known[key]
+
+    def floor(self, model: Model, lag: float) -> float:
+        """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
+
+        What is so far apart differs by noise and by what changes faster (von Neumann 1941).
+        """
+        recording = self._recordings["here"]
+        moving, force = self._samples("here", delay_of(model))
+        left = self._left(model, "here")
+        steps = np.diff(np.asarray(recording.time, float)[moving])
+        steps = steps[steps > 0]
+        count = max(1, round(lag / float(np.median(steps)))) if steps.size else 1
+        apart = np.abs(left[count:] - left[:-count])[moving[count:] & moving[:-count]]
+        if not apart.size:
+            return float("nan")
+        noise = float(np.median(apart)) / 0.6745 / np.sqrt(2)
+        both = noise, np.sqrt(np.mean(left[moving] ** 2))  # noise is no more than all of it
+        return relative(np.full(int(moving.sum()), min(both)), force[moving])

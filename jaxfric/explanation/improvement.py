@@ -1,0 +1,172 @@
+"""After is never worse than before: findings go until the model that is saved is no worse."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..models import Model
+from ..simulation.prediction import delay_of
+from . import parameters as spelled, verification
+from .figures import Figures
+from .naming import LEAST_SHARE, Named
+from .predictions import with_predictions
+from .question import Question
+from .regression import Fit, fit
+from .timing import LATE
+
+# The question where what the findings leave is judged, and the findings there.
+Rest = tuple[Question, Named]
+
+
+class Errors(NamedTuple):
+    """Force errors of one model, by `predict` and through the kernel; `None` without a held-out
+    recording.
+    """
+
+    here: float
+    held: float | None
+    filtered: float
+    filtered_held: float | None
+
+    def worse(self, before: "Errors", rounding: float) -> list[str]:
+        """Which of the figures are worse than before, by more than rounding."""
+        pairs = {
+            name: (ours, theirs)
+            for name, ours, theirs in zip(self._fields, self, before, strict=True)
+            if ours is not None and theirs is not None
+        }
+        # What is not a number is no better than what is.
+        return [n for n, (ours, was) in pairs.items() if not ours <= was * (1 + rounding)]
+
+
+class Improved(NamedTuple):
+    """What is reported: the baseline, the findings that are left, and both models' errors.
+
+    `first`: the baseline; `gone`: effects whose findings went, as the model with them is worse;
+    `spoilt`: its errors; `refitted`: whether the baseline's values are others than those given.
+    """
+
+    first: Fit
+    found: Named
+    rest: Rest
+    refitted: bool
+    before: Errors
+    after: Errors
+    gone: tuple[str, ...] = ()
+    spoilt: Errors | None = None
+
+
+def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Figures) -> Improved:
+    """The findings, without those that make the saved model worse than the baseline `first`.
+
+    By either figure, here or on the held-out recording, over the same samples. Which one goes is
+    decided on the recording itself: the one without which its force error is least. The held-out
+    recording only objects.
+    """
+    units = asked.evidence.motion.units
+    base = found._replace(last=first, taken=[])
+    refitted = first is not found.base
+    start, spoilt = found, None
+    while True:
+        delay = delay_of(spelled.model(found.last, units))
+        before = _errors(base, (asked, base), asked, figures, units, delay)
+        alike = not found.taken and not refitted
+        after = before if alike else _errors(found, rest, asked, figures, units)
+        if not after.worse(before, figures.rounding):
+            less = None if spoilt is None else _without_idle(found, rest, asked)
+            if less is None:
+                break
+            found, rest = less
+            continue
+        spoilt = spoilt or after
+        if not found.taken:
+            found, rest, refitted = base, (asked, base), False
+            continue
+        fewer = (_lacking(found, rest, asked, n) for n in range(len(found.taken)))
+        found, rest = min(fewer, key=lambda pair: _here(pair[0], figures, units))
+    kept = [taken.trial.candidate.effect.name for taken in found.taken]
+    names = [taken.trial.candidate.effect.name for taken in start.taken]
+    gone = tuple(dict.fromkeys(n for n in names if names.count(n) > kept.count(n)))
+    if spoilt is not None and not gone:
+        gone = ("parameter_mismatch",)
+    return Improved(first, found, rest, refitted, before, after, gone, spoilt)
+
+
+def _without_idle(found: Named, rest: Rest, asked: Question) -> tuple[Named, Rest] | None:
+    """Without a finding that stood beside one that went, and by itself is a trifle."""
+    for number in range(len(found.taken)):
+        less, other = _lacking(found, rest, asked, number)
+        if 1 - rest[1].last.energy / other[1].last.energy < LEAST_SHARE:
+            return less, other
+    return None
+
+
+def elsewhere(found: Named, rest: Rest, units) -> Model:
+    """The model as it stands on the held-out recording.
+
+    That is the saved one, but for waves at their phase there and without what belongs to a moment
+    that does not return.
+    """
+    where, left = rest
+    there = verification.carried(left.last, where.held, left.rephased)
+    late = len(found.last.terms) - len(left.last.terms)
+    if late:
+        there = _with_late(there, found.last, late)
+    return spelled.model(there, units)
+
+
+def _with_late(now: Fit, last: Fit, count: int) -> Fit:
+    """A fit and the last terms of another one."""
+    return now._replace(
+        terms=(*now.terms, *last.terms[-count:]),
+        betas=(*now.betas, *last.betas[-count:]),
+        alphas=(*now.alphas, *last.alphas[-count:]),
+    )
+
+
+def _here(found: Named, figures: Figures, units) -> float:
+    error = figures.here(spelled.model(found.last, units))
+    return error if np.isfinite(error) else np.inf
+
+
+def _errors(
+    found: Named, rest: Rest, asked: Question, figures: Figures, units, delay: float | None = None
+) -> Errors:
+    """`delay`: that of the model whose samples the figures are to be taken over, if another's."""
+    where, left = rest
+    filtered = verification.error(left.last, where.evidence)
+    here = figures.here(spelled.model(found.last, units), delay)
+    if asked.held is None:
+        return Errors(here, None, filtered, None)
+    held = figures.held(elsewhere(found, rest, units), delay)
+    return Errors(here, held, filtered, verification.error(left.last, where.held, left.rephased))
+
+
+def _lacking(found: Named, rest: Rest, asked: Question, number: int) -> tuple[Named, Rest]:
+    """The findings without one of them, the others refitted; where the force acts late, too."""
+    where, left = rest
+    if where is asked or number == len(left.taken):
+        less = _less(found, asked, number)
+        return less, (asked, less)
+    left = _less(left, where, number)
+    late = found.last.terms[-1]
+    assert isinstance(late, LATE)
+    beta, alpha = found.last.betas[-1], found.last.alphas[-1]
+    seen = with_predictions(asked.evidence, left.last)
+    now = fit((*left.last.terms, late), seen, [*left.last.betas, beta], 0)
+    now = now._replace(alphas=(*left.last.alphas, alpha), betas=(*left.last.betas, beta))
+    return found._replace(last=now, taken=_but(found.taken, number)), (where, left)
+
+
+def _less(found: Named, asked: Question, number: int) -> Named:
+    taken = _but(found.taken, number)
+    if not taken:
+        return found._replace(last=found.base, taken=[])
+    evidence = with_predictions(asked.evidence, found.last)
+    last = verification.lacking(found, evidence, number)
+    return found._replace(last=last, taken=taken)
+
+
+def _but(values: Iterable, number: int) -> list:
+    return [value for i, value in enumerate(values) if i != number]

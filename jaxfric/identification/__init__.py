@@ -1,0 +1,1 @@
+"""Friction and inertia of one recording, or of a batch: rows, grid, refinement, uncertainty."""

@@ -1,0 +1,67 @@
+"""The JSON documents that others rely on."""
+
+import json
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ..data.printable import json_text
+from ..data.recording import Recording
+from ..data.summary import facts
+from ..models import name_of
+
+IDENTIFICATION = "jaxfric.identification/1"
+
+
+def identification(
+    found: Any, recording: Recording | None = None, notes: Sequence[str] = ()
+) -> dict[str, Any]:
+    """An `Identified` as plain data (schema `jaxfric.identification/1`).
+
+    **Arguments:** `recording` that it was identified from, with the `notes` of its reader, so that
+    its facts are told as well.
+    """
+    parameters = {
+        name: {
+            "value": float(estimate.value),
+            "standard_error": float(estimate.standard_error),
+            "unit": estimate.unit,
+        }
+        for name, estimate in found.parameters.items()
+    }
+    return {
+        "schema": IDENTIFICATION,
+        "name": name_of(found.model.term),
+        "recording": {} if recording is None else facts(recording, notes),
+        "model": found.model.to_dict(),
+        "parameters": parameters,
+        "projection": found.projection,
+        "windows": int(found.windows),
+        "covered": float(found.covered),
+        "open_ends": open_ends(found),
+        "result": found.result_name,
+        "diagnosis": found.diagnosis,
+        "force_error": float(found.force_error),
+        "warnings": [remark.to_dict() for remark in found.remarks],
+    }
+
+
+def open_ends(found: Any) -> dict[str, float]:
+    """The bias that the whole record's unequal end velocities would leave, by parameter."""
+    names = [parameter.name for parameter in found.model.term.affine]
+    return dict(zip(names, map(float, found.open_ends), strict=True))
+
+
+def to_json(document: Any) -> str:
+    """JSON text; what is infinite or not a number becomes null, as JSON has neither."""
+    text = json.dumps(finite(document), indent=2, ensure_ascii=False, allow_nan=False)
+    return json_text(text) + "\n"
+
+
+def finite(value: Any) -> Any:
+    """Plain data with `None` for what is infinite or not a number."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,316 @@
+"""The two ways to free the axis equation from acceleration; both end in rows of one regression.
+
+`ClosedWindows` keeps samples in windows whose end velocities are equal: there acceleration is
+orthogonal to every function of velocity (Kim, Kim & Ha 2004, Lemma 1), so inertia is left out.
+`WeakForm` passes everything through a smooth compact kernel, on which the time derivative sits
+(modulating functions, Shinbrot 1957; Messenger & Bortz 2021); inertia stays as one more column.
+"""
+
+from abc import abstractmethod
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..data.recording import Recording
+from ..signals import continuous, interval, kernel, kernel_slope
+from ..terms.base import AbstractTerm
+from ..terms.sample import Scales
+
+# Levels of velocity tried for the ends of a window, between the first and the last velocity of a
+# segment: outside that range windows only get shorter.
+WINDOW_LEVELS = 17
+
+
+class Rows(eqx.Module):
+    """Rows of the regression u ≈ Σ g α, and the linear map that makes them from samples.
+
+    - `target`: the projected force, N, shape `(J,)`.
+    - `positive`, `negative`: weights of the rows in each direction of slip, s, `(J,)`.
+    - `moving`: weights of the rows on which a model is judged: reversals too, rest not, `(J,)`.
+    - `time`: s, `(J,)`.
+    - `windows`: how many windows (or, in the weak form, slip stretches) were used.
+    - `covered`: share of the valid slip time that the rows use.
+    """
+
+    target: Float[Array, " J"]
+    positive: Float[Array, " J"]
+    negative: Float[Array, " J"]
+    moving: Float[Array, " J"]
+    time: Float[Array, " J"]
+    windows: Float[Array, ""]
+    covered: Float[Array, ""]
+    _filter: "Filter | None" = None
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the rows are the samples themselves, not passed through a kernel."""
+        return self._filter is None
+
+    def project(
+        self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None = None
+    ) -> Float[Array, "J p"]:
+        """Columns as rows of the regression, shape `(J, p)`; `momentum` enters differentiated."""
+        return columns if self._filter is None else self._filter.apply(columns, momentum)
+
+    def thinned(self, recording: Recording, step: int) -> tuple["Rows", Recording]:
+        """The same rows from one of so many samples, and these samples: for a first look.
+
+        `step` divides the kernel's half-width and the distance of two kernels.
+        """
+        if step == 1 or self._filter is None:
+            return self, recording
+        some = jax.tree.map(lambda x: x[::step], recording)
+        coarse = make_filter(some, interval(some), self._filter.reach // step)
+        return eqx.tree_at(lambda r: r._filter, self, coarse), some
+
+    def columns(self, term: AbstractTerm | None, recording: Recording) -> Float[Array, "J p"]:
+        """The rows of a term's columns, `(J, p)`; no columns where there is no term."""
+        if term is None:
+            return jnp.zeros((self.target.shape[0], 0), self.target.dtype)
+        momentum = term.momentum(recording) if term.inertial else None
+        return self.project(term.columns(recording), momentum)
+
+    def offset(self, term: AbstractTerm, recording: Recording) -> Float[Array, " J"]:
+        """The rows of a term's known part f0, `(J,)`."""
+        return self.project(term.offset(recording)[:, None])[:, 0]
+
+    def relative(self, left: Float[Array, " J"]) -> Float[Array, ""]:
+        """norm(left)/norm(force) over the rows in motion: the relative force error."""
+        ours, whole = (jnp.sum(self.moving * x**2) for x in (left, self.target))
+        return jnp.sqrt(ours / jnp.where(whole > 0, whole, 1.0))
+
+
+class AbstractProjection(eqx.Module):
+    """A way to rows; `keeps_inertia` tells whether acceleration is in them."""
+
+    keeps_inertia: eqx.AbstractClassVar[bool]
+
+    @abstractmethod
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
+        """The rows of a prepared recording with its scales."""
+
+
+class ClosedWindows(AbstractProjection):
+    """Samples in slip, inside windows that end with the velocity at which they began.
+
+    In every segment the longest window is taken, its ends interpolated to the crossing of the
+    common end velocity; the windows are pooled.
+    """
+
+    keeps_inertia = False
+
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
+        """The rows of a prepared recording: its samples, weighted by the time they stand for."""
+        begin, end = _windows(recording, scales)
+        positive, negative, slip = _slip_time(recording, scales, begin, end)
+        used = jnp.sum(positive) + jnp.sum(negative)
+        first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
+        windows = jnp.sum(first & (end > begin))
+        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
+        moving = jnp.where(jnp.abs(recording.velocity) > scales.slowest, scales.interval, 0.0)
+        moving = jnp.where(recording.mask, moving, 0.0)
+        force, time = recording.force, recording.time
+        return Rows(force, positive, negative, moving, time, windows, covered)
+
+
+def _windows(recording: Recording, scales: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """Begin and end of the longest closed window of the segment that each sample belongs to, s."""
+    time, velocity = recording.time, recording.velocity
+    together = continuous(recording, scales.interval)
+    count = recording.num_segments or 1
+    segment = recording.segment
+
+    def over(reduce, per_segment, values, fill):
+        if count == 1:
+            return jnp.broadcast_to(reduce(values), (1,))
+        return per_segment(jnp.where(jnp.isfinite(values), values, fill), segment, count)
+
+    def first(values):
+        return over(jnp.min, jax.ops.segment_min, values, jnp.inf)
+
+    def last(values):
+        return over(jnp.max, jax.ops.segment_max, values, -jnp.inf)
+
+    valid = recording.mask
+    begins = first(jnp.where(valid, time, jnp.inf))[segment] == time
+    ends = last(jnp.where(valid, time, -jnp.inf))[segment] == time
+    v_first = -first(jnp.where(begins & valid, -velocity, jnp.inf))
+    v_last = -first(jnp.where(ends & valid, -velocity, jnp.inf))
+
+    size = jnp.max(jnp.where(valid & jnp.isfinite(velocity), jnp.abs(velocity), 0.0))
+    rounding = 64 * jnp.finfo(velocity.dtype).eps * size
+
+    def longest(best, share):
+        level = (v_first + share * (v_last - v_first))[segment]
+        above = velocity - level
+        # A record that ends at the velocity at which it began does so to rounding.
+        above = jnp.where(jnp.abs(above) <= rounding, 0.0, above)
+        crosses = together & (above[1:] * above[:-1] <= 0)
+        rise = jnp.where(above[1:] == above[:-1], 1.0, above[1:] - above[:-1])
+        share_before = jnp.clip(-above[:-1] / rise, 0.0, 1.0)
+        at = time[:-1] + share_before * jnp.diff(time)
+        early = jnp.concatenate([jnp.where(crosses, at, jnp.inf), jnp.full(1, jnp.inf)])
+        late = jnp.concatenate([jnp.where(crosses, at, -jnp.inf), jnp.full(1, -jnp.inf)])
+        begin, end = first(early), last(late)
+        better = end - begin > best[1] - best[0]
+        return (jnp.where(better, begin, best[0]), jnp.where(better, end, best[1])), None
+
+    empty = (jnp.zeros(count, time.dtype), jnp.zeros(count, time.dtype))
+    shares = jnp.linspace(0.0, 1.0, WINDOW_LEVELS, dtype=time.dtype)
+    (begin, end), _ = jax.lax.scan(longest, empty, shares)
+    return begin[segment], end[segment]
+
+
+def _slip_time(recording: Recording, scales: Scales, begin, end):
+    """Time that each sample stands for in slip of either direction, s; and all the slip time.
+
+    The trapezoidal rule on the velocity's straight line between samples, cut at the window's ends
+    and where the line enters or leaves the stick zone; an interval's share goes to the end that
+    slips, or half to each. The cuts are level sets of the velocity, so each direction's pieces
+    are closed windows themselves and Lemma 1 holds on them.
+    """
+    time, velocity = recording.time, recording.velocity
+    together = continuous(recording, scales.interval)
+    steps = jnp.where(together, jnp.diff(time), 0.0)
+    # Where the window cuts the interval, in shares of it.
+    safe = jnp.where(steps > 0, steps, 1.0)
+    low = jnp.clip((begin[1:] - time[:-1]) / safe, 0.0, 1.0)
+    high = jnp.clip((end[1:] - time[:-1]) / safe, 0.0, 1.0)
+
+    def direction(sign):
+        height = sign * velocity - scales.slowest
+        left, right = height[:-1], height[1:]
+        cross = jnp.clip(left / jnp.where(left == right, 1.0, left - right), 0.0, 1.0)
+        a = jnp.where(left > 0, 0.0, cross)
+        b = jnp.where(right > 0, 1.0, cross)
+        slips = (left > 0) | (right > 0)
+        a, b = jnp.maximum(a, low), jnp.minimum(b, high)
+        length = jnp.where(slips, jnp.maximum(b - a, 0.0), 0.0)
+        # The integral of a straight line over [a, b] in terms of its end values at 0 and 1.
+        to_right = length * 0.5 * (a + b)
+        to_left = length - to_right
+        only_left, only_right = (left > 0) & ~(right > 0), (right > 0) & ~(left > 0)
+        to_left = jnp.where(only_left, length, jnp.where(only_right, 0.0, to_left)) * steps
+        to_right = jnp.where(only_right, length, jnp.where(only_left, 0.0, to_right)) * steps
+        return jnp.pad(to_left, (0, 1)) + jnp.pad(to_right, (1, 0))
+
+    moving = jnp.abs(velocity) > scales.slowest
+    slip = jnp.sum(jnp.where(moving[1:] & moving[:-1], steps, 0.0))
+    return direction(1.0), direction(-1.0), slip
+
+
+class Filter(eqx.Module):
+    """A kernel slid along the record: local averages, and the derivative that sits on the kernel.
+
+    `average` and `slope`: weights of the samples around each centre, `(2 reach + 1, J)`. The
+    slope weights are normalised so that a constant has none and a straight line in time exactly
+    its own, on any clock.
+    """
+
+    average: Float[Array, "K J"]
+    slope: Float[Array, "K J"]
+    reach: int = eqx.field(static=True)
+    stride: int = eqx.field(static=True)
+
+    def gather(self, values: Float[Array, "N *p"], offset) -> Float[Array, "J *p"]:
+        """The values `offset` samples from each centre."""
+        return _gather(values, offset, self.reach, self.stride)
+
+    def apply(
+        self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None
+    ) -> Float[Array, "J p"]:
+        """Kernel averages of columns plus those of the time derivative of momentum, `(J, p)`.
+
+        ∫ φ ḣ dt = −∫ φ̇ h dt: the derivative is taken on the kernel.
+        """
+
+        def add(total, step):
+            offset, average, slope = step
+            total = total + average[:, None] * self.gather(columns, offset)
+            if momentum is not None:
+                total = total + slope[:, None] * self.gather(momentum, offset)
+            return total, None
+
+        offsets = jnp.arange(-self.reach, self.reach + 1)
+        empty = jnp.zeros((self.average.shape[1], columns.shape[1]), columns.dtype)
+        return jax.lax.scan(add, empty, (offsets, self.average, self.slope))[0]
+
+
+def _gather(values, offset, reach, stride):
+    count = len(range(reach, values.shape[0] - reach, stride))
+    piece = jax.lax.dynamic_slice_in_dim(values, reach + offset, (count - 1) * stride + 1)
+    return piece[::stride]
+
+
+def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int) -> Filter:
+    """The kernel of that half-width in samples on the clock of a recording.
+
+    `typical` is the sampling interval, s.
+
+    **Raises:** `ValueError` if the recording is shorter than the kernel.
+    """
+    if recording.num_samples <= 2 * half_width:
+        raise ValueError(
+            f"A kernel of {2 * half_width + 1} samples does not fit into a recording of "
+            f"{recording.num_samples}; use a shorter WeakForm(half_width=...)."
+        )
+    stride = max(1, half_width // 2)
+    steps = jnp.where(continuous(recording, typical), jnp.diff(recording.time), 0.0)
+    duration = 0.5 * (jnp.pad(steps, (0, 1)) + jnp.pad(steps, (1, 0)))
+    centre = _gather(recording.time, 0, half_width, stride)
+
+    def weigh(offset):
+        since = _gather(recording.time, offset, half_width, stride) - centre
+        lasts = _gather(duration, offset, half_width, stride)
+        tau = since / (half_width * typical)
+        slope = kernel_slope(tau) * lasts
+        return kernel(tau) * lasts, slope, slope * since
+
+    # One offset after the other: together the slices were a gather of every sample.
+    average, slope, rise = jax.lax.map(weigh, jnp.arange(-half_width, half_width + 1))
+    mass, rise = jnp.sum(average, axis=0), jnp.sum(rise, axis=0)
+    average = average / jnp.where(mass > 0, mass, 1.0)[None, :]
+    slope = slope / jnp.where(rise != 0, rise, 1.0)[None, :]
+    slope = slope.at[half_width].add(-jnp.sum(slope, axis=0))
+    return Filter(average, slope, half_width, stride)
+
+
+class WeakForm(AbstractProjection):
+    """Everything through one kernel (1 − τ²)⁴, slid along the record by half its half-width.
+
+    **Arguments:** `half_width`, in samples; see [`kernel_half_width`][] for the default.
+    Kernels not wholly inside slip of one direction are left out, since there friction jumps.
+    """
+
+    half_width: int = eqx.field(static=True)
+    keeps_inertia = True
+
+    def rows(self, recording: Recording, scales: Scales) -> Rows:
+        """The rows of a prepared recording; weighted where the kernel lies wholly inside slip."""
+        filter_ = make_filter(recording, scales.interval, self.half_width)
+        velocity, reach = recording.velocity, self.half_width
+        breaks = jnp.pad(jnp.cumsum(~continuous(recording, scales.interval)), (1, 0))
+        whole = filter_.gather(breaks, reach) == filter_.gather(breaks, -reach)
+
+        def within(slips):
+            stops = jnp.cumsum(~slips)
+            before = filter_.gather(stops - (~slips).astype(stops.dtype), -reach)
+            return whole & (filter_.gather(stops, reach) == before)
+
+        spacing = filter_.stride * scales.interval
+        positive = jnp.where(within(velocity > scales.slowest), spacing, 0.0)
+        negative = jnp.where(within(velocity < -scales.slowest), spacing, 0.0)
+        moving = (jnp.abs(velocity) > scales.slowest) & recording.mask
+        sampled = filter_.apply(
+            jnp.stack([recording.force, moving.astype(velocity.dtype)], 1), None
+        )
+        sign = jnp.sign(positive - negative)
+        windows = jnp.sum((sign != jnp.pad(sign[:-1], (1, 0))) & (sign != 0))
+        slip = jnp.sum(jnp.where(moving, scales.interval, 0.0))
+        used = jnp.sum(positive) + jnp.sum(negative)
+        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
+        mostly = jnp.where(whole & (sampled[:, 1] > 0.5), spacing, 0.0)
+        time = filter_.gather(recording.time, 0)
+        return Rows(sampled[:, 0], positive, negative, mostly, time, windows, covered, filter_)

@@ -1,0 +1,154 @@
+"""What an identification is asked: the arguments checked, the recording prepared."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from .. import programs, signals
+from ..data.recording import Recording, described
+from ..models import Model, named
+from ..terms.base import AbstractTerm
+from . import blocks, grids
+from .identified import Identified
+from .projections import AbstractProjection, ClosedWindows, WeakForm
+
+
+class Question(NamedTuple):
+    """All that an identification depends on: the term, a prepared recording or batch, the
+    projection, the half-width of the weak form's kernel (of the mass and of the force error too),
+    the bounds by name and the points of the grid, or a plan of several.
+    """
+
+    term: AbstractTerm
+    recording: Recording
+    projection: AbstractProjection
+    width: int
+    bounds: tuple[tuple[str, tuple[float, float]], ...]
+    grid: grids.Plan | int | None
+
+
+def ask(
+    model: AbstractTerm | Model | Identified | str,
+    recording: Recording,
+    projection: AbstractProjection | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    grid: int | None = None,
+    width: int | None = None,
+) -> Question:
+    """What [`identify`][] solves for its arguments; `width`, where it is known already.
+
+    **Raises:** `ValueError` if the model cannot be identified from such a recording.
+    """
+    term = _structure(model)
+    _check_arguments(term, projection, bounds, grid)
+    batched = recording.time.ndim == 2
+    prepared = _prepare_batch(recording) if batched else signals.prepare(recording)
+    _check(term, projection, prepared)
+    width = _width(projection, prepared) if width is None else width
+    limits = tuple(sorted((name, tuple(map(float, pair))) for name, pair in (bounds or {}).items()))
+    chosen = projection or (WeakForm(width) if _beyond_velocity(term) else ClosedWindows())
+    plan = _plan(term, prepared, chosen, dict(limits)) if grid is None else grid
+    return Question(term, prepared, chosen, width, limits, plan)
+
+
+# Scales of a recording on the host.
+_scales = programs.kept(signals.scales)
+
+
+def _plan(term, recording, projection, given) -> grids.Plan | None:
+    """The grids of a term that needs its own; the usual ones where the recording is traced."""
+    if not blocks.staged(term):
+        return None
+    width = projection.half_width if isinstance(projection, WeakForm) else None
+    if signals.is_traced(recording):
+        return grids.plan(term, given, None, width)
+    if recording.time.ndim == 1:
+        return grids.plan(term, given, _scales(recording), width)
+    count = recording.time.shape[0]
+    rows = [_scales(jax.tree.map(lambda x, i=i: x[i], recording)) for i in range(count)]
+    return grids.plan(term, given, jax.tree.map(lambda *x: np.stack(x), *rows), width)
+
+
+def _width(projection: AbstractProjection | None, recording: Recording) -> int:
+    """Half-width of the weak form's kernel; a batch shares the median of a few rows' widths."""
+    if isinstance(projection, WeakForm):
+        return projection.half_width
+    if recording.time.ndim == 1 or signals.is_traced(recording):
+        return signals.kernel_half_width(recording)
+    count = recording.time.shape[0]
+    some = [jax.tree.map(lambda x, i=i: x[i], recording) for i in range(0, count, -(-count // 8))]
+    return sorted(signals.kernel_half_width(row) for row in some)[len(some) // 2]
+
+
+def _structure(model) -> AbstractTerm:
+    if isinstance(model, str):
+        return named(model)
+    if isinstance(model, Identified):
+        return model.model.term
+    if isinstance(model, Model):
+        return model.term
+    if not isinstance(model, AbstractTerm):
+        raise ValueError(
+            f"identify needs a model's name, a sum of terms (terms.Coulomb() + …), a Model or an "
+            f"Identified, not {described(model)}."
+        )
+    return model
+
+
+def _check_arguments(term, projection, bounds, grid) -> None:
+    if projection is not None and not isinstance(projection, AbstractProjection):
+        raise ValueError(
+            f"projection is {described(projection)}; give jaxfric.ClosedWindows(), "
+            "jaxfric.WeakForm(half_width) or None."
+        )
+    if not isinstance(grid, int | np.integer | None) or (grid is not None and grid < 2):
+        raise ValueError(f"grid is {grid!r}; give a whole number of points a side from 2, or None.")
+    if not isinstance(bounds, Mapping | None):
+        raise ValueError(
+            f"bounds is {described(bounds)}; give pairs by name, {{name: (low, high)}}."
+        )
+    searched = [p.name for p in term.nonlinear]
+    for name, pair in (bounds or {}).items():
+        if name not in searched and name not in {each.rstrip("+-") for each in searched}:
+            raise ValueError(
+                f"bounds names {name!r}, which the model does not search; it searches "
+                f"{', '.join(searched) or 'nothing'}."
+            )
+        if np.shape(pair) != (2,) or not pair[0] < pair[1]:
+            raise ValueError(f"The bounds of {name} are {pair!r}; give (low, high), low first.")
+
+
+def _beyond_velocity(term: AbstractTerm) -> frozenset[str]:
+    return term.coordinates - {"velocity", "acceleration"}
+
+
+def _check(term, projection, recording):
+    beyond = _beyond_velocity(term)
+    if isinstance(projection, ClosedWindows) and beyond:
+        raise ValueError(
+            f"ClosedWindows leaves inertia out, which is exact only for functions of velocity; "
+            f"this model depends on {', '.join(sorted(beyond))} too, and acceleration is not "
+            "orthogonal to that. Use projection=jaxfric.WeakForm(...), or leave it to the default."
+        )
+    missing = {"position"} & beyond if recording.position is None else set()
+    missing |= {c for c in beyond if c not in ("position", "time") and c not in recording.channels}
+    if missing:
+        raise ValueError(
+            f"The model needs {', '.join(sorted(missing))}, which the recording lacks; "
+            f"it has {', '.join(['time', 'velocity', *recording.channels])}."
+        )
+
+
+def _prepare_batch(recording: Recording) -> Recording:
+    if recording.velocity is not None:
+        return recording
+    if signals.is_traced(recording):
+        return jax.vmap(signals.prepare)(recording)
+    rows = [
+        jax.tree.map(lambda x, i=i: np.asarray(x)[i], recording) for i in range(len(recording.time))
+    ]
+    velocity = np.stack([np.asarray(signals.prepare(row).velocity) for row in rows])
+    return dataclasses.replace(recording, velocity=velocity)

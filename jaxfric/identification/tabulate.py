@@ -1,0 +1,244 @@
+"""What the command prints for a person: plain aligned text."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..data import summary
+from ..data.printable import printable
+from ..looks.text import Block, Table, aligned, text, wrapped
+from ..models import NAMED
+from .uncertainty import COSINES, student_quantile
+
+# The result whose diagnosis needs no words.
+FINE = "successful"
+
+EQUATIONS = {
+    "coulomb-viscous": "F = Fc sign(v) + Fv v",
+    "gaussian": "F = Fc sign(v) + Fv v + Fb sign(v) exp(-(v/vs)²)",
+    "lorentzian": "F = Fc sign(v) + Fv v + Fb sign(v) / (1 + (v/vs)²)",
+    "exponential": "F = Fc sign(v) + Fv v + Fb sign(v) exp(-|v|/vs)",
+    "generalised": "F = Fc sign(v) + Fv v + Fb sign(v) exp(-|v/vs|^δ)",
+}
+
+
+def models() -> str:
+    """The named models with their equations."""
+    width = max(map(len, NAMED))
+    lines = [f"{name:{width}}  {EQUATIONS[name]}" for name in NAMED]
+    lines += [
+        "",
+        "Fc coulomb, Fv viscous, Fb stribeck_force, vs stribeck_velocity, δ stribeck_exponent;",
+        "each direction of motion has its own (names end in + and -); inertia, M dv/dt, is added.",
+        "The prefix symmetric- ties the directions and adds a constant offset.",
+    ]
+    return "\n".join(lines)
+
+
+def identification(
+    document: Mapping[str, Any],
+    truth: Mapping[str, float] | None = None,
+    automatic: bool = True,
+) -> str:
+    """An identification (schema `jaxfric.identification/1`) as a table with its circumstances.
+
+    **Arguments:** `truth`, true values to stand beside; `automatic`, whether the projection was
+    left to choose itself, so that the reason is told.
+    """
+    return text(identified(document, truth, automatic))
+
+
+def identified(
+    document: Mapping[str, Any],
+    truth: Mapping[str, float] | None = None,
+    automatic: bool = False,
+) -> list[Block]:
+    """The paragraphs and the table of [`identification`][]; the recording may be absent."""
+    result = f"force error {_percent(document['force_error'])}   result {document['result']}"
+    told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
+    if document["result"] != "not_passive":
+        told += _remarks(document["parameters"])
+    return [
+        _source(document),
+        [f"model {document['name']}; {_how(document, automatic)}"],
+        _table(document["parameters"], truth),
+        told + _closing(document),
+    ]
+
+
+def _percent(share: float) -> str:
+    return f"{share:.2%}" if math.isfinite(share) else "unknown"
+
+
+def many(documents: Sequence[Mapping[str, Any]]) -> str:
+    """Identifications of several recordings, one row each."""
+    names = list(dict.fromkeys(name for d in documents for name in d["parameters"]))
+    units = {name: e["unit"] for d in documents for name, e in d["parameters"].items()}
+    same_model = len({d["name"] for d in documents}) == 1
+    head = ["file", "model", "force error", *names, "result"]
+    rows = [head, ["", "", "", *(units[name] for name in names), ""]]
+    for document in documents:
+        cells = [_cell(document["parameters"].get(name)) for name in names]
+        error = f"{document['force_error']:.2%}"
+        file = _name(document)
+        rows.append([file, document["name"], error, *cells, document["result"]])
+    if same_model:
+        rows = [[row[0], *row[2:]] for row in rows]
+    numeric = range(1 if same_model else 2, len(rows[0]) - 1)
+    lines = [f"model {documents[0]['name']}", ""] if same_model else []
+    lines += aligned(rows, numeric)
+    lines += ["", "~ the 95 % interval is wider than the value; - not visible; intervals: --json"]
+    for result, diagnosis in dict.fromkeys((d["result"], d["diagnosis"]) for d in documents):
+        if result != FINE:
+            lines += wrapped(f"{result}: {diagnosis}")
+    for document in documents:
+        for each in warnings(document):
+            lines += [f"{_name(document)}: {line}" for line in wrapped(each)]
+    return "\n".join(lines)
+
+
+def _name(document: Mapping[str, Any]) -> str:
+    return printable(Path(document["recording"]["file"]).name)
+
+
+def warnings(document: Mapping[str, Any]) -> list[str]:
+    """What is wrong with the recording or the fit, a paragraph each."""
+    return [f"Warning: {w['text']}" for w in document.get("warnings", [])]
+
+
+def _cell(entry: Mapping[str, Any] | None) -> str:
+    if entry is None or not math.isfinite(entry["standard_error"]):
+        return "-"
+    doubtful = _half(entry) > abs(entry["value"])
+    return f"{'~' * doubtful}{entry['value']:.4g}"
+
+
+def _half(entry: Mapping[str, Any]) -> float:
+    """Half the 95 % interval."""
+    return student_quantile(0.975, COSINES) * entry["standard_error"]
+
+
+def _source(document: Mapping[str, Any]) -> list[str]:
+    """The recording: how much of it, in which units, and what was put in order."""
+    if not document["recording"]:
+        return []
+    facts, units = document["recording"], document["model"]["units"]
+    named = f"force in {units['force']}, position in {units['position']}"
+    return [f"{printable(summary.line(facts))}, {named}", *(f"  {note}" for note in facts["notes"])]
+
+
+def _how(document: Mapping[str, Any], automatic: bool) -> str:
+    covered = f"{document['covered']:.0%} of the slip time"
+    if document["projection"] == "closed_windows":
+        count = document["windows"]
+        which = f"{count} window{'s' * (count != 1)}"
+        return f"closed windows ({which}, {covered}; no mass, no acceleration)"
+    why = "closed windows would use less than half of it; " * automatic
+    return f"weak form ({document['windows']} slip stretches, {covered}; {why}inertia fitted too)"
+
+
+def _table(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> Table:
+    table = [["parameter", "value", "± 95 %", "unit"] + (["true"] if truth else [])]
+    for name, entry in parameters.items():
+        seen = math.isfinite(entry["standard_error"])
+        row = [
+            name,
+            f"{entry['value']:.5g}" if seen else "-",
+            f"{_half(entry):.2g}" if seen else "not visible",
+            entry["unit"],
+        ]
+        table.append(row + ([f"{truth[name]:.5g}"] if truth else []))
+    return Table(table, (1, 2, 4))
+
+
+def _closing(document: Mapping[str, Any]) -> list[str]:
+    """What closing the windows was good for, where it was more than the uncertainty."""
+    parameters = document["parameters"]
+    gains = [
+        f"{name} by {bias:+.2g} {parameters[name]['unit']}"
+        for name, bias in document["open_ends"].items()
+        if abs(bias) > parameters[name]["standard_error"]
+    ]
+    if not gains:
+        return []
+    return [
+        "Used whole, with its unequal end velocities, the record would be off in "
+        + ", ".join(gains)
+        + "."
+    ]
+
+
+def _remarks(parameters: Mapping[str, Any]) -> list[str]:
+    """What an engineer would object to, said first."""
+    sizes = {name: (e["value"], _half(e)) for name, e in parameters.items()}
+    falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
+    # An infinite half width is "not visible", which the table and the diagnosis say already.
+    faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half < math.inf]
+    passive = ("coulomb", "viscous", "inertia")
+    wrong = [n for n, (value, half) in sizes.items() if n.startswith(passive) and value < -half]
+    lines = []
+    if falling:
+        lines.append(
+            f"{' and '.join(falling)} negative: friction falls towards zero speed instead of "
+            "rising. That is no Stribeck effect; presliding, lag or a dead time near reversals "
+            "looks so."
+        )
+    if faint:
+        lines.append(
+            f"{' and '.join(faint)} cannot be told from zero, nor then its velocity: a simpler "
+            "model may do (--model best, in Python jaxfric.select, lets held-out data choose)."
+        )
+    if wrong:
+        lines.append(
+            f"{' and '.join(wrong)} negative, as in no passive axis: the sign of force or motion "
+            "is wrong, or a force that the model lacks (load, cogging) is taken for it."
+        )
+    return lines
+
+
+def _bump(name: str) -> bool:
+    return name.startswith("stribeck_force")
+
+
+def explanation(document: Mapping[str, Any]) -> str:
+    """An explanation (schema `jaxfric.explanation/1`) in words and tables."""
+    return text(explained(document))
+
+
+def explained(document: Mapping[str, Any]) -> list[Block]:
+    """The paragraphs and tables of [`explanation`][]."""
+    facts = document["recording"]
+    file = printable(facts["file"])
+    source = [f"{file}: {facts['samples']} samples, {facts['duration']:.4g} s"]
+    source += [f"  {note}" for note in facts.get("notes", [])]
+    said = [f"{document['verdict']}: {document['summary']}", *warnings(document)]
+    motion = document["fit"].get("simulation_error")
+    if motion and motion["before"] is not None:
+        after = "not to be run" if motion["after"] is None else f"{motion['after']:.2%}"
+        said += [f"Run forward: velocity error {motion['before']:.2%} before, {after} after."]
+    baseline = [f"baseline {document['baseline']['name']}"]
+    findings = [_finding(finding) for finding in document["findings"]]
+    return [source, baseline, said, *findings, *_places(document)]
+
+
+def _finding(finding: Mapping[str, Any]) -> list[str]:
+    lines = [finding["effect"], f"  {finding['sentence']}"]
+    if finding["confusable_with"] and finding["separate_by"]:
+        lines.append(f"  To tell: {finding['separate_by']}")
+    return lines
+
+
+def _places(document: Mapping[str, Any]) -> list[Block]:
+    """Where the baseline errs, and what would not have been seen."""
+    where = [["where the baseline errs", "share", "p", "detail"]]
+    for place in document["where"]:
+        name = place["coordinate"].replace("_", " ")
+        share, chance = f"{place['share']:.0%}", f"{place['p_value']:.3f}"
+        where.append([name, share, chance, place["detail"]])
+    hidden = [["not found, would have been seen from", "", ""]]
+    for entry in document["not_visible"]:
+        name = entry["effect"].replace("_", " ")
+        hidden.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
+    tables = [Table(where, (1, 2)), Table(hidden, (1,))]
+    return [table for table in tables if len(table.rows) > 1]

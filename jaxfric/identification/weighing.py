@@ -1,0 +1,82 @@
+"""The mass, weighed after a fit that left it out: what the friction leaves of the weak form."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..data.recording import Recording
+from . import reduced, uncertainty
+from .projections import Rows
+from .uncertainty import Deviations
+
+
+class Weighed(NamedTuple):
+    """The mass and what its uncertainty consists of.
+
+    - `mass`: kg.
+    - `own`: its deviations for friction parameters that are exactly known, `(K, 1)`.
+    - `through`: its derivative by the friction parameters, `(p,)`.
+    - `left`: what mass and friction leave of the weak form's rows, N, `(J,)`.
+    - `columns`: derivatives of these rows by the mass and by the friction's parameters, `(J, 1+p)`.
+    """
+
+    mass: Float[Array, ""]
+    own: Deviations
+    through: Float[Array, " p"]
+    left: Float[Array, " J"]
+    columns: Float[Array, "J q"]
+
+    def beside(self, friction: Deviations, index: int) -> Deviations:
+        """The deviations of friction parameters and mass together, the mass at that index.
+
+        Both follow the same cosines of slip time, so that what the friction's error does to the
+        mass adds to the mass's own error with its sign.
+        """
+        votes = self.own.votes[:, 0] + friction.votes @ self.through
+        together = jnp.insert(friction.votes, index, votes, axis=1)
+        return Deviations(together, jnp.insert(friction.hidden, index, self.own.hidden[0]))
+
+
+def weigh(
+    alpha: Float[Array, " q"],
+    jacobian: Float[Array, "N p"],
+    offset: Float[Array, " N"],
+    place: Float[Array, " N"],
+    recording: Recording,
+    weak: Rows,
+) -> Weighed:
+    """The mass that best explains what the friction leaves of the weak form's force.
+
+    **Arguments:** `alpha`, the friction's affine parameters; `jacobian`, derivative of the friction
+    at the samples by all its parameters, affine ones first; `offset`, its known part, N; `place`,
+    where each sample stands in the slip time; `weak`, rows of the weak form.
+    """
+    friction = offset + jacobian[:, : alpha.size] @ alpha
+    velocity = recording.velocity
+    still = jnp.zeros_like(velocity)
+    values = jnp.concatenate([jnp.stack([still, friction, place], 1), jacobian], axis=1)
+    momentum = jnp.zeros_like(values).at[:, 0].set(velocity)
+    rows = weak.project(values, momentum)
+    push, left, weight = rows[:, :1], weak.target - rows[:, 1], weak.positive + weak.negative
+    root = reduced.root(weight)
+    mass = reduced.least_squares(root[:, None] * push, root * left)
+    left = left - push @ mass
+    # What the friction's error leaves is no noise of the rows: it comes in through the friction.
+    columns = jnp.concatenate([push, rows[:, 3:]], axis=1)
+    basis = reduced.orthonormal(root[:, None] * columns)
+    noise = reduced.project_out(basis, (root * left)[:, None])[:, 0]
+    noise = jnp.where(root > 0, noise / jnp.where(root > 0, root, 1.0), 0.0)
+    own = uncertainty.deviations(push, noise, weight, rows[:, 2])
+    weighted = weight * push[:, 0]
+    size = jnp.vdot(weighted, push[:, 0])
+    through = -(weighted @ rows[:, 3:]) / jnp.where(size > 0, size, 1.0)
+    return Weighed(mass[0], own, through, left, columns)
+
+
+def open_ends(
+    columns: Float[Array, "N q"], slope: Float[Array, " N"], weight: Float[Array, " N"]
+) -> Float[Array, " q"]:
+    """D⁻¹ ∫ v̇ g dt over all slip: what Lemma 1 makes zero where the end velocities are equal."""
+    root = reduced.root(weight)
+    return reduced.least_squares(root[:, None] * columns, root * slope)

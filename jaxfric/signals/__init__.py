@@ -1,0 +1,36 @@
+"""Velocity without phase lag, noise, magnitudes, and what counts as slip."""
+
+from .clock import (
+    GAP_FACTOR as GAP_FACTOR,
+    SORTED as SORTED,
+    continuous as continuous,
+    host_continuous as host_continuous,
+    host_interval as host_interval,
+    interval as interval,
+    is_traced as is_traced,
+    quantile as quantile,
+)
+from .motion import (
+    SLIP_DEVIATIONS as SLIP_DEVIATIONS,
+    SLIP_SHARE as SLIP_SHARE,
+    counter_velocity as counter_velocity,
+    kernel_half_width as kernel_half_width,
+    prepare as prepare,
+    scales as scales,
+    velocity_noise as velocity_noise,
+)
+from .parabolas import (
+    TRACED_REACH as TRACED_REACH,
+    choose_half_width as choose_half_width,
+    kernel as kernel,
+    kernel_slope as kernel_slope,
+    local_quadratic as local_quadratic,
+    white_noise as white_noise,
+)
+from .polynomial import (
+    HALF_WIDTHS as HALF_WIDTHS,
+    Choice as Choice,
+    choose as choose,
+    derivative as derivative,
+    smoothing as smoothing,
+)

@@ -1,0 +1,123 @@
+"""The motion of a recording: its velocity, its magnitudes, and what counts as slip."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .. import programs
+from ..data.recording import Recording
+from ..terms.sample import Scales
+from . import polynomial
+from .clock import continuous, interval, is_traced, quantile
+from .parabolas import TRACED_REACH, choose_half_width, local_quadratic, white_noise
+from .polynomial import HALF_WIDTHS, Choice, weights
+
+# Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
+# worth of the friction curve; it also bounds the dynamic range that a velocity grid has to cover.
+SLIP_SHARE = 0.006
+# Four standard deviations: one sample of noise in 16,000 passes for slip.
+SLIP_DEVIATIONS = 4.0
+
+
+def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
+    """A recording with a velocity and without values that cannot be computed with.
+
+    A recorded velocity is kept. Else the velocity is the zero-phase smoothing derivative of the
+    position, by the local polynomial that [`choose`][jaxfric.signals.choose] finds most accurate or
+    by the one that is given; inside `jax.jit` by local parabolas, whose widths reach less far.
+    Samples that are not finite but valid by their mask stay: `identify` reports them.
+    """
+    if recording.velocity is not None:
+        return recording
+    if is_traced(recording):
+        width = choose_half_width(recording, TRACED_REACH)
+        span = (width + 0.5) * interval(recording)
+        velocity = local_quadratic(recording, recording.position, span, TRACED_REACH)[1]
+        return dataclasses.replace(recording, velocity=velocity)
+    choice = polynomial.choose(recording) if choice is None else choice
+    position = np.asarray(recording.position)
+    slope = polynomial.derivative(recording, position, choice.half_width, choice.degree)
+    usable = np.isfinite(position) | ~np.asarray(recording.mask)
+    derived = np.where(usable, slope, np.nan).astype(position.dtype)
+    return dataclasses.replace(recording, velocity=derived)
+
+
+def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:
+    """Standard deviation of the white part of the velocity, m/s; `typical`: sampling interval."""
+    return white_noise(recording, recording.velocity, typical)
+
+
+def scales(recording: Recording) -> Scales:
+    """Magnitudes of a prepared recording, from which bounds and thresholds are derived."""
+    valid = recording.mask
+    speed = jnp.where(valid, jnp.abs(recording.velocity), jnp.nan)
+    fastest, typical = quantile(speed, 0.98), interval(recording)
+    noise = velocity_noise(recording, typical)
+    slowest = jnp.maximum(SLIP_DEVIATIONS * noise, SLIP_SHARE * fastest)
+    position = recording.velocity if recording.position is None else recording.position
+    inside = jnp.where(valid, position, jnp.nan)
+    time = jnp.where(valid, recording.time, jnp.nan)
+    count = jnp.maximum(jnp.sum(valid), 1).astype(speed.dtype)
+    force = jnp.sqrt(jnp.sum(jnp.where(valid, recording.force, 0.0) ** 2) / count)
+    start, end = jnp.nanmin(time), jnp.nanmax(time)
+    low, high = jnp.nanmin(inside), jnp.nanmax(inside)
+    return Scales(slowest, fastest, low, high, force, start, end - start, typical)
+
+
+def counter_velocity(
+    counts: Float[Array, " N"], clock: Float[Array, " N"], resolution: float, tick: float = 1.0
+) -> Float[Array, " N"]:
+    """Velocity by the M/T method: counts between two pulses over the clock time between them.
+
+    **Arguments:** `counts`, accumulated encoder counts at the last pulse before each sample,
+    shape `(N,)`; `clock`, timer reading at that pulse; `resolution`, m per count; `tick`, s per
+    unit of `clock`.
+
+    **Returns:** velocity, m/s, shape `(N,)`; zero while no pulse arrives. The value is the mean
+    over the pulse interval, as in Kim, Kim & Ha (2004), section IV.
+    """
+    elapsed = jnp.diff(clock, prepend=clock[:1]) * tick
+    moved = jnp.diff(counts, prepend=counts[:1]) * resolution
+    fresh = elapsed > 0
+    velocity = jnp.where(fresh, moved / jnp.where(fresh, elapsed, 1.0), 0.0)
+    return velocity.at[0].set(velocity[1])
+
+
+@programs.kept
+def _host_facts(recording):
+    limits, position = scales(recording), recording.position
+    typical = limits.interval
+    jitter = jnp.zeros(()) if position is None else white_noise(recording, position, typical)
+    return limits, velocity_noise(recording, typical), jitter, continuous(recording, typical)
+
+
+def kernel_half_width(recording: Recording) -> int:
+    """Half-width, in samples, of the weak form's kernel for a prepared recording.
+
+    The shortest of the ladder, from 16 samples (on which the kernel's quadrature is exact to
+    rounding), for which the noise of velocity or position is under a thousandth of the power of
+    the acceleration column, so that it biases the mass by under 0.1 %; but an eighth of the typical
+    slip stretch at most, so that most rows survive the reversals. Inside jit, where the
+    recording has no values yet: 24 samples.
+    """
+    if is_traced(recording):
+        return 24
+    velocity = np.nan_to_num(np.asarray(recording.velocity, float))
+    limits, noise, jitter, linked = jax.tree.map(np.asarray, _host_facts(recording))
+    slipping = velocity[np.abs(velocity) > limits.slowest]
+    stretches = int(np.count_nonzero(np.diff(np.sign(slipping)))) + (recording.num_segments or 1)
+    longest = int(np.count_nonzero(recording.mask)) // stretches // 8
+    fitting = [k for k in HALF_WIDTHS if k <= max(2, longest)]
+    broken = np.pad(np.cumsum(~linked), (1, 0))
+    for width in (k for k in fitting if k >= 16):
+        shape = weights(width, 2) / limits.interval
+        whole = broken[2 * width :] == broken[: -2 * width]
+        slopes = np.convolve(velocity, shape[::-1], "valid")
+        power = np.sum(slopes[whole] ** 2) / max(1, np.count_nonzero(whole))
+        rough = np.diff(shape, prepend=0.0, append=0.0) / limits.interval
+        if max(noise**2 * np.sum(shape**2), jitter**2 * np.sum(rough**2)) <= 1e-3 * power:
+            return width
+    return fitting[-1]

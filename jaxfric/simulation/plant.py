@@ -1,0 +1,131 @@
+"""The axis as a dynamical system: the terms at one state, and one step exact about sticking."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..data.recording import Recording
+from ..models import Model
+
+Scalar = Float[Array, ""]
+
+
+class Plant(eqx.Module):
+    """M(x) dv/dt = u − F(x, v), read off a model's columns and momentum.
+
+    **Arguments:** `model`; `smooth`, the velocity of the smooth approximation of stick-slip, m/s,
+    or `None` for the exact law.
+    """
+
+    model: Model
+    smooth: Scalar | None = None
+
+    def resistance(self, position: Scalar, velocity: Float[Array, " k"], rest: "Surroundings"):
+        """Force without acceleration at one position and several velocities, N, shape `(k,)`."""
+        if self.smooth is None:
+            return _force(self.model, rest.motion(position, velocity))
+        least = slowest(velocity.dtype)
+        sided = jnp.stack([jnp.maximum(velocity, least), jnp.minimum(velocity, -least)])
+        laws = _force(self.model, rest.motion(position, jnp.ravel(sided)))
+        forward, backward = jnp.reshape(laws, sided.shape)
+        share = 0.5 * (1 + jnp.tanh(velocity / self.smooth))
+        return share * forward + (1 - share) * backward
+
+    def inertia(self, position: Scalar, velocity: Scalar, rest: "Surroundings"):
+        """Effective inertia ∂p/∂v, and the force (∂p/∂x) v + ∂p/∂t of a momentum that varies."""
+
+        def momentum(x, v, t):
+            motion = rest.at(t).motion(x, v[None])
+            return (self.model.term.momentum(motion) @ self.model.alpha)[0]
+
+        by_position, mass, by_time = jax.grad(momentum, argnums=(0, 1, 2))(
+            position, velocity, rest.time
+        )
+        return mass, by_position * velocity + by_time
+
+    def rates(self, position: Scalar, velocity: Scalar, rest: "Surroundings"):
+        """Inertia, and how fast the resistance changes: M, (∂F/∂v, ∂F/∂x)."""
+
+        def force(x, v):
+            return self.resistance(x, v[None], rest)[0]
+
+        stiffness, damping = jax.grad(force, argnums=(0, 1))(position, velocity)
+        return self.inertia(position, velocity, rest)[0], (damping, stiffness)
+
+    def step(self, state: tuple[Scalar, Scalar], force: Scalar, span: Scalar, rest: "Surroundings"):
+        """Position and velocity after `span` seconds under a constant force.
+
+        Two phases: the second is what is left of the time after a stop in the first. A second
+        stop within one step would be chatter, and ends the step at rest.
+        """
+        *state, left = self._phase(*state, force, span, rest)
+        *state, _ = self._phase(*state, force, left, rest)
+        return tuple(state)
+
+    def _phase(self, x, v, force, span, rest):
+        """One midpoint step on one side of zero velocity, ended where the velocity is zero."""
+        side, first = self._start(x, v, force, rest)
+        middle = self._beside(side, v + 0.5 * span * first)
+        rate = self._acceleration(x + 0.5 * span * v, middle, force, rest)
+        rate = rate if self.smooth is not None else jnp.where(side == 0, 0.0, rate)
+        end = v + span * rate
+        # Stops at the fraction of the step where the straight line to `end` meets zero.
+        stops = jnp.zeros_like(end, bool) if self.smooth is not None else side * end < 0
+        taken = jnp.where(stops, v / jnp.where(stops, v - end, 1.0), 1.0) * span
+        end = jnp.where(stops, 0.0, end)
+        return x + 0.5 * taken * (v + end), end, span - taken
+
+    def _start(self, x, v, force, rest):
+        """Direction of motion, 0 where the axis sticks (Kim, Kim & Ha 2004, eq. 4), and dv/dt."""
+        if self.smooth is not None:
+            return jnp.zeros_like(v), self._acceleration(x, v, force, rest)
+        least = slowest(v.dtype)
+        moving, forward, backward = self.resistance(x, jnp.stack([v, least, -least]), rest)
+        mass, drift = self.inertia(x, v, rest)
+        free = force - drift
+        breaks = jnp.where(free > forward, 1.0, jnp.where(free < backward, -1.0, 0.0))
+        side = jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
+        resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, free))
+        return side, (free - jnp.where(v == 0, resting, moving)) / mass
+
+    def _beside(self, side, v):
+        """The velocity, kept on its side of zero: a law for one direction ends at zero."""
+        return v if self.smooth is not None else side * jnp.maximum(side * v, slowest(v.dtype))
+
+    def _acceleration(self, x, v, force, rest):
+        mass, drift = self.inertia(x, v, rest)
+        return (force - drift - self.resistance(x, v[None], rest)[0]) / mass
+
+
+def _force(model: Model, motion: Recording) -> Float[Array, " k"]:
+    """As the model's own, but with every parameter known: this is done at every step."""
+    return model.term.columns(motion) @ model.alpha + model.term.offset(motion)
+
+
+class Surroundings(eqx.Module):
+    """What else a term may look at: time, s, and the other channels, each a scalar."""
+
+    time: Scalar
+    channels: dict[str, Scalar]
+
+    def at(self, time: Scalar) -> "Surroundings":
+        """The same at another time."""
+        return Surroundings(time, self.channels)
+
+    def motion(self, position: Scalar, velocity: Float[Array, " k"]) -> Recording:
+        """A recording of one position with several velocities, as terms read it."""
+        like = jnp.zeros_like(velocity)
+        channels: dict[str, Any] = {name: like + value for name, value in self.channels.items()}
+        return Recording(like + self.time, like, like + position, velocity, channels=channels)
+
+
+def slowest(dtype) -> Scalar:
+    """The velocity that stands for the limit v → 0±.
+
+    The root of the smallest normal number: its square does not underflow, and viscous friction at
+    it is lost in rounding beside any force, in any unit.
+    """
+    return jnp.sqrt(jnp.finfo(dtype).tiny).astype(dtype)

@@ -1,0 +1,194 @@
+"""Backward in time, as it were: the force that a recorded motion needs."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from .. import checks, programs, signals
+from ..data.recording import Recording, require, uniform
+from ..identification.projections import WeakForm
+from ..models import Model, require as require_model, weighed
+from ..terms import TransportDelay
+from ..terms.base import summands
+
+
+def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
+    """The force that the recorded motion needs, N, shape `(N,)`.
+
+    The model's columns, and the zero-phase smoothing derivative of its momentum, whose width is
+    chosen from the noise of the position (of the velocity where there is no position). Pure: may
+    stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
+    to break-away, the value is that of the terms at rest. A [`TransportDelay`][jaxfric.terms] is
+    taken in whole, u(t) = f(t + τ), and not to first order. NaN where a parameter counts that the
+    model has no value for.
+    """
+    require_model(model, "predict")
+    require(recording, "predict")
+    model, delay = _at_once(model)
+    prepared = with_channels(model, signals.prepare(recording))
+    rate = _rate(model.momentum(prepared), prepared, recording.velocity is None)
+    return _later(prepared, model.force(prepared) + rate, delay)
+
+
+def _rate(momentum: Float[Array, " N"], prepared: Recording, derived: bool) -> Float[Array, " N"]:
+    """The zero-phase smoothing derivative of the momentum, shape `(N,)`.
+
+    On the host by the local polynomial that is best for a recorded velocity; for a derived one by
+    the wider of those that are best for the first and the second derivative of the position. Inside
+    jit by a parabola.
+    """
+    traced = signals.is_traced(prepared) or isinstance(momentum, jax.core.Tracer)
+    if traced:
+        motion = prepared
+        if prepared.position is None:
+            motion = dataclasses.replace(prepared, position=prepared.velocity)
+        width = jax.lax.stop_gradient(signals.choose_half_width(motion, signals.TRACED_REACH))
+        span = (width + 0.5) * signals.interval(prepared)
+        return signals.local_quadratic(prepared, momentum, span, signals.TRACED_REACH)[1]
+    if derived:
+        first, second = (signals.choose(prepared, order=order) for order in (1, 2))
+        choice = max(first, second, key=lambda each: each.half_width)
+    else:
+        choice = signals.choose(prepared, prepared.velocity)
+    rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree)
+    return jnp.asarray(rate, momentum.dtype)
+
+
+def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
+    """The model with a delay of zero, and its delay, s; `None` where it has none."""
+    if not any(isinstance(term, TransportDelay) for term in summands(model.term)):
+        return model, None
+    return model.with_parameters({"delay": 0.0}), model.parameters["delay"]
+
+
+def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:
+    """A signal at t + `delay`, straight between the samples; held at the ends of a segment."""
+    if delay is None:
+        return signal
+    time, segment = recording.time, recording.segment
+    steps = jnp.where(segment[1:] == segment[:-1], jnp.diff(time), 0.0)
+    elapsed = jnp.concatenate([jnp.zeros(1, time.dtype), jnp.cumsum(jnp.maximum(steps, 0.0))])
+    # Segments far enough apart that none reaches the next one.
+    apart = elapsed + segment.astype(time.dtype) * (elapsed[-1] + 1)
+    ends = jnp.searchsorted(segment, segment, side="right") - 1
+    starts = jnp.searchsorted(segment, segment, side="left")
+    wanted = jnp.clip(apart + delay, apart[starts], apart[ends])
+    return jnp.interp(wanted, apart, signal)
+
+
+def with_channels(model: Model, recording: Recording) -> Recording:
+    """A prepared recording with the channel `predicted_force`, if terms of the model read it.
+
+    Faults of the actuator act on the force f that the motion needs, N, which the terms without
+    faults predict. A channel that is there already stays.
+    """
+    if "predicted_force" not in model.term.coordinates - set(recording.channels):
+        return recording
+    sound = model.without("predicted_")
+    span = signals.kernel_half_width(recording) * signals.interval(recording)
+    reach = signals.kernel_half_width(recording)
+
+    def rate(signal):
+        return signals.local_quadratic(recording, signal, span, reach)[1]
+
+    force = sound.force(recording) + rate(sound.momentum(recording))
+    channels = recording.channels | {"predicted_force": force}
+    return dataclasses.replace(recording, channels=channels)
+
+
+def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
+    """Samples whose force no actuator made, by [`lone`][jaxfric.checks], `(N,)`.
+
+    At most three in a row, far beyond all others: a fault of the sensor, the bus or the file. A
+    push or an impact lasts, and stays.
+    """
+    force, valid = np.asarray(recording.force, float), np.asarray(recording.mask)
+    valid = valid & np.isfinite(force)
+    found = np.zeros_like(valid)
+    if np.count_nonzero(valid) > 2 * checks.LONE:
+        found[valid] = checks.lone(force[valid])
+    return found
+
+
+def in_motion(recording: Recording, delay: float = 0.0) -> Bool[np.ndarray, " N"]:
+    """The samples that a force error is taken over, `(N,)`.
+
+    Valid ones, without [`outliers`][], that are faster than the slowest speed that is told from
+    rest, by [`signals.scales`][]; of a model with a `delay`, s, also that much later, which is what
+    its force is for. At rest friction takes any value up to break-away.
+    """
+    prepared = signals.prepare(uniform(recording))
+    speed = np.abs(np.asarray(prepared.velocity))[: recording.num_samples]
+    moving = speed > float(_scales(prepared).slowest)
+    if delay:
+        moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
+    return np.asarray(recording.mask) & moving & ~outliers(recording)
+
+
+def unseen(names: Sequence[str], recording: Recording) -> list[str]:
+    """The names of parameters (`+`, `-`) of a direction in which a recording does not move."""
+    velocity = np.asarray(signals.prepare(uniform(recording)).velocity)[: recording.num_samples]
+    velocity = velocity[in_motion(recording)]
+    idle = [s for s, ways in (("+", velocity > 0), ("-", velocity < 0)) if not ways.any()]
+    return [name for name in names if name.endswith(tuple(idle))]
+
+
+def delay_of(model: Model) -> float:
+    """The dead time of a model, s; zero where it has none."""
+    delay = _at_once(model)[1]
+    return 0.0 if delay is None else float(delay)
+
+
+_scales = programs.kept(signals.scales)
+
+
+def residual(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
+    """The recorded force less the one by [`predict`][], N, `(N,)`, on the host."""
+    # One of few lengths, so that few programs serve all recordings.
+    predicted = np.asarray(predict(model, uniform(recording)), float)[: recording.num_samples]
+    return np.asarray(recording.force, float) - predicted
+
+
+def force_error(model: Model, recording: Recording) -> float:
+    """norm(u − û)/norm(u) over the samples [`in_motion`][], with û by [`predict`][].
+
+    No filter but the derivative in û: the noise of the recorded force is in it. NaN where nothing
+    moves or no force is recorded.
+    """
+    moving = in_motion(recording, delay_of(model))
+    force = np.asarray(recording.force, float)
+    return relative(residual(model, recording)[moving], force[moving])
+
+
+def relative(left: Float[np.ndarray, " M"], force: Float[np.ndarray, " M"]) -> float:
+    """norm(left)/norm(force); NaN where there is no force."""
+    size = float(np.linalg.norm(force))
+    return float(np.linalg.norm(left)) / size if size > 0 else float("nan")
+
+
+def relative_error(
+    model: Model, recording: Recording, half_width: int | None = None
+) -> Float[Array, ""]:
+    """norm(u − û)/norm(u) of a model on a recording, both passed through the same kernel.
+
+    The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.
+    `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
+    """
+    model, delay = _at_once(model)
+    prepared = with_channels(model, signals.prepare(recording))
+    if delay is not None:
+        prepared = dataclasses.replace(prepared, force=_later(prepared, prepared.force, -delay))
+    width = half_width or signals.kernel_half_width(prepared)
+    return _relative_error(model, prepared, width)
+
+
+@eqx.filter_jit
+def _relative_error(model, recording, width):
+    rows = WeakForm(width).rows(recording, signals.scales(recording))
+    left = rows.target - weighed(rows.columns(model.term, recording), model.alpha)
+    return rows.relative(left - rows.offset(model.term, recording))

@@ -1,0 +1,313 @@
+"""Forward in time: an axis, its friction exact about sticking, in closed or open loop."""
+
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, PRNGKeyArray
+
+from .. import signals
+from ..data.recording import Recording, described, require
+from ..models import Model, require as require_model
+from .control import AbstractController, Encoder, Feedback
+from .plant import Plant, Surroundings, slowest
+
+# Between two samples the actuator force is constant, so the acceleration changes only as fast as
+# the terms let it: at their rates λ = |∂F/∂v|/M and √(|∂F/∂x|/M). A midpoint step of h = 0.1/λ
+# errs by (hλ)³/6, which over a time constant (ten steps) is 0.2 % of the motion.
+RATE_PER_STEP = 0.1
+# Bounds the cost where a friction curve is (nearly) vertical beside zero velocity.
+MOST_SUBSTEPS = 64
+# Inside jax.jit the rates are not known when the program is built.
+TRACED_SUBSTEPS = 8
+# Speeds, relative to the fastest of the reference, at which the rates are looked at.
+_SPEEDS = tuple(10.0 ** (-k / 2) for k in range(9))
+
+
+class _Held(NamedTuple):
+    """What is constant from one sample to the next, as arrays of shape `(N,)` before the scan."""
+
+    time: Array
+    interval: Array
+    force: Array
+    reference: Array
+    reference_velocity: Array
+    channels: dict[str, Array]
+    restart: Array
+    initial_position: Array
+    initial_velocity: Array
+    noise: Array
+
+
+class _State(NamedTuple):
+    position: Array
+    velocity: Array
+    measured: Array
+    elapsed: Array
+    memory: Any
+
+
+def simulate(
+    model: Model,
+    reference: Recording,
+    controller: AbstractController | None = None,
+    *,
+    encoder: Encoder | None = None,
+    force_noise: float | Float[Array, ""] = 0.0,
+    key: PRNGKeyArray | None = None,
+    substeps: int | None = None,
+    smooth: float | Float[Array, ""] | None = None,
+    initial: tuple[Any, Any] | None = None,
+) -> Recording:
+    """The motion of an axis that obeys the model, on the clock of a recording.
+
+    M(x) dv/dt = u − F, with slip and stick friction as in Kim, Kim & Ha (2004), eqs. 1 to 4: at
+    rest the axis stays until the other forces exceed F_slip(0±), and a step that would cross zero
+    velocity stops there and goes on from rest for the time that is left. So there is no smoothing
+    constant. Elsewhere the explicit midpoint rule (order two, stopping times included).
+
+    **Arguments:**
+
+    - `model`: any [`Model`][jaxfric.models.Model] with inertia, whose terms are functions of one
+      sample; units are those of the recording.
+    - `reference`: a recording, signals of shape `(N,)`. With a `controller`, the set-point is its
+      channel `reference`, else its position; the set-point's velocity is the channel
+      `reference_velocity`, else the velocity that belongs to the position, else differences.
+      Without, its force drives the axis.
+    - `controller`: [`PD`][], [`PID`][], [`Cascade`][] or one of your own. It reads the motion at
+      a sample and holds its force until the next.
+    - `encoder`: what controller and result see instead of the true position; the controller's
+      velocity is then the backward difference of the counts, else the true velocity.
+    - `force_noise`: standard deviation of noise on the force returned, N. It is not applied to
+      the axis.
+    - `key`: for the noise of force and encoder.
+    - `substeps`: integration steps a sample; from the model's rates by default (inside `jax.jit`,
+      where they are unknown, 8).
+    - `smooth`: a velocity ε, m/s: replaces stick-slip by the blend (1 ± tanh(v/ε))/2 of the laws
+      for the two directions. An approximation (the axis creeps where it should stick), for
+      gradients that must also see how sticking depends on the parameters; it is stiff, so give
+      `substeps` above 5 Δt F/(M ε) inside `jax.jit`. The exact simulation is differentiable too,
+      almost everywhere.
+    - `initial`: position and velocity at the start, by default those of the set-point (of the
+      recorded motion in open loop). Every segment of the recording starts anew.
+
+    **Returns:** a recording on the same clock: `force`, held from its sample to the next, N;
+    `position`, m, and `velocity`, m/s, at the sample (no velocity if there is an encoder); all
+    channels, and `reference` in closed loop.
+
+    **Raises:** `ValueError` for fewer than two samples, without a set-point or an inertia, or for
+    noise without a key.
+    """
+    _check(model, reference, controller, encoder, force_noise, key)
+    if substeps is None:
+        substeps = default_substeps(model, reference, smooth)
+    force_key, encoder_key = (None, None) if key is None else jax.random.split(key)
+    model, controller, encoder = _cast((model, controller, encoder), reference.time.dtype)
+    held = _held(reference, controller, encoder, encoder_key, initial)
+    smooth = None if smooth is None else jnp.asarray(smooth, reference.time.dtype)
+    force, position, velocity = _integrate(model, controller, encoder, held, substeps, smooth)
+    if force_key is not None:
+        noise = jax.random.normal(force_key, force.shape, force.dtype)
+        force = force + jnp.asarray(force_noise, force.dtype) * noise
+    channels = dict(reference.channels)
+    if controller is not None:
+        channels["reference"] = held.reference
+    return dataclasses.replace(
+        reference,
+        force=force,
+        position=position,
+        velocity=velocity if encoder is None else None,
+        channels=channels,
+    )
+
+
+def _check(model, reference, controller, encoder, force_noise, key):
+    require_model(model, "simulate")
+    require(reference, "simulate")
+    if not isinstance(controller, AbstractController | None):
+        raise ValueError(
+            f"controller is {described(controller)}; give jaxfric.PD(...), PID(...), Cascade(...), "
+            "one of your own, or None for an open loop."
+        )
+    name = reference.source or "the reference"
+    aimless = reference.position is None and "reference" not in reference.channels
+    if controller is not None and aimless:
+        raise ValueError(
+            f"simulate with a controller needs a set-point; {name} has neither a channel "
+            "'reference' nor a position. Add one, or leave out the controller to drive by force."
+        )
+    if lacking := [] if _traced(model) else _lacking(model):
+        raise ValueError(
+            f"simulate needs every parameter, and the model has no value for {', '.join(lacking)}, "
+            "which its recording did not show. Record motion in both directions, or give them: "
+            "model.with_parameters({...})."
+        )
+    if not _traced((model, reference)) and _massless(model, reference):
+        raise ValueError(
+            "simulate needs an inertia to accelerate, and the model's is not positive: it has "
+            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass."
+        )
+    noisy = _positive(force_noise) or (encoder is not None and _positive(encoder.noise))
+    if noisy and key is None:
+        raise ValueError("simulate with noise needs a key=jax.random.key(seed) to draw it from.")
+
+
+def _positive(value) -> bool:
+    return not isinstance(value, jax.core.Tracer) and bool(np.any(np.asarray(value) > 0))
+
+
+def _lacking(model) -> list[str]:
+    """The parameters without a finite value."""
+    with jax.ensure_compile_time_eval():
+        return [n for n, value in model.parameters.items() if not np.isfinite(np.asarray(value))]
+
+
+def _massless(model, reference) -> bool:
+    # Inside jax.jit a computation on known numbers is put off too, unless one insists.
+    with jax.ensure_compile_time_eval():
+        return not bool(np.all(np.asarray(_rates(model, reference, None)[0]) > 0))
+
+
+def _traced(tree) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
+
+
+def _cast(tree, dtype):
+    """Every floating-point leaf in the recording's precision."""
+
+    def cast(leaf):
+        inexact = eqx.is_array_like(leaf) and jnp.issubdtype(jnp.asarray(leaf).dtype, jnp.floating)
+        return jnp.asarray(leaf, dtype) if inexact else leaf
+
+    return jax.tree.map(cast, tree)
+
+
+def _slope(time, signal, together):
+    """Difference quotient over both neighbours, or over the one that belongs to the segment."""
+    steps = jnp.where(together, jnp.diff(time), 0.0)
+    rises = jnp.where(together, jnp.diff(signal), 0.0)
+    span = jnp.pad(steps, (1, 0)) + jnp.pad(steps, (0, 1))
+    return (jnp.pad(rises, (1, 0)) + jnp.pad(rises, (0, 1))) / jnp.where(span > 0, span, 1.0)
+
+
+def _held(reference, controller, encoder, key, initial) -> _Held:
+    time, dtype = reference.time, reference.time.dtype
+    together = reference.segment[1:] == reference.segment[:-1]
+    steps = jnp.where(together, jnp.diff(time), 0.0)
+    # The last force of a segment moves nothing that is recorded.
+    interval = jnp.pad(steps, (0, 1))
+    zeros = jnp.zeros_like(time)
+    goal, goal_velocity = _set_point(reference, controller, together)
+    first, first_velocity = (goal, goal_velocity) if initial is None else initial
+    restart = jnp.pad(~together, (1, 0), constant_values=True)
+    return _Held(
+        time,
+        interval,
+        jnp.where(reference.mask, reference.force, 0.0),
+        goal,
+        goal_velocity,
+        dict(reference.channels),
+        restart,
+        zeros + jnp.asarray(first, dtype),
+        zeros + jnp.asarray(first_velocity, dtype),
+        zeros if encoder is None else encoder.draw(key, time.shape[0], dtype),
+    )
+
+
+def _set_point(reference, controller, together):
+    given = reference.channels
+    if controller is not None and "reference" in given:
+        goal, velocity = given["reference"], given.get("reference_velocity")
+    elif reference.position is not None:
+        goal, velocity = reference.position, reference.velocity
+    else:
+        goal, velocity = jnp.zeros_like(reference.time), reference.velocity
+    return goal, _slope(reference.time, goal, together) if velocity is None else velocity
+
+
+@eqx.filter_jit
+def _integrate(model, controller, encoder, held, substeps, smooth):
+    """Force, position and velocity at every sample, each `(N,)`: one scan, compiled once."""
+    plant = Plant(model, smooth)
+
+    def advance(state, now):
+        fresh = _fresh(controller, encoder, now)
+        state = jax.tree.map(lambda new, old: jnp.where(now.restart, new, old), fresh, state)
+        measured = state.position if encoder is None else encoder.read(state.position, now.noise)
+        force, memory = now.force, state.memory
+        if controller is not None:
+            velocity = _seen_velocity(state, measured, encoder, now)
+            seen = (now.interval, now.reference, now.reference_velocity, measured, velocity)
+            force, memory = controller(memory, Feedback(*seen))
+        span, rest = now.interval / substeps, Surroundings(now.time, now.channels)
+
+        def substep(i, motion):
+            clock = rest.at(now.time + span * i.astype(span.dtype))
+            return plant.step(motion, force, span, clock)
+
+        motion = jax.lax.fori_loop(0, substeps, substep, state[:2], unroll=min(substeps, 2))
+        following = _State(*motion, measured, now.interval, memory)
+        return following, (force, measured, state.velocity)
+
+    first = _fresh(controller, encoder, jax.tree.map(lambda x: x[0], held))
+    return jax.lax.scan(advance, first, held)[1]
+
+
+def _fresh(controller, encoder, now):
+    """The state at the start of a segment."""
+    x, v = now.initial_position, now.initial_velocity
+    measured = x if encoder is None else encoder.read(x, now.noise)
+    memory = () if controller is None else controller.start()
+    return _State(x, v, measured, jnp.zeros_like(x), memory)
+
+
+def _seen_velocity(state, measured, encoder, now):
+    """The true velocity, or with an encoder the backward difference of its counts."""
+    if encoder is None:
+        return state.velocity
+    elapsed = state.elapsed
+    known = elapsed > 0
+    difference = (measured - state.measured) / jnp.where(known, elapsed, 1.0)
+    return jnp.where(known, difference, now.initial_velocity)
+
+
+def default_substeps(
+    model: Model, reference: Recording, smooth: float | Float[Array, ""] | None = None
+) -> int:
+    """Integration steps a sample that make the midpoint rule accurate to a few parts in a thousand.
+
+    The sampling interval times the fastest rate of the model at positions and (down to a ten
+    thousandth of) velocities of the reference, over 0.1; between 1 and 64. Inside `jax.jit`: 8.
+    """
+    if _traced((model, reference, smooth)):
+        return TRACED_SUBSTEPS
+    with jax.ensure_compile_time_eval():
+        mass, slopes = _rates(model, reference, smooth)
+        damping, stiffness = (jnp.nan_to_num(jnp.abs(slope)) / mass for slope in slopes)
+        rate = jnp.max(jnp.maximum(damping, jnp.sqrt(stiffness)))
+        steps = float(signals.interval(reference) * rate) / RATE_PER_STEP
+    if not math.isfinite(steps):
+        return MOST_SUBSTEPS
+    return min(max(math.ceil(steps), 1), MOST_SUBSTEPS)
+
+
+@eqx.filter_jit
+def _rates(model, reference, smooth):
+    """Inertia, ∂F/∂v and ∂F/∂x at states of the reference, each `(256, 2 speeds + 1)`."""
+    dtype = reference.time.dtype
+    plant = Plant(*_cast((model, None if smooth is None else jnp.asarray(smooth)), dtype))
+    together = reference.segment[1:] == reference.segment[:-1]
+    goal, velocity = _set_point(reference, True, together)
+    speeds = jnp.nanmax(jnp.abs(velocity)) * jnp.asarray(_SPEEDS, dtype)
+    speeds = jnp.maximum(speeds, slowest(dtype))
+    rest = [] if smooth is None else [jnp.zeros(1, dtype)]
+    grid = jnp.concatenate([speeds, -speeds, *rest])
+    chosen = jnp.linspace(0, goal.shape[0] - 1, 256).astype(int)
+    channels = {name: channel[chosen] for name, channel in reference.channels.items()}
+    each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
+    surroundings = Surroundings(reference.time[chosen], channels)
+    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)

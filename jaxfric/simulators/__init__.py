@@ -1,0 +1,4 @@
+"""Other programs' simulators as baselines: their force along the recorded motion, as it is."""
+
+from .known import Known as Known, along as along, same_motion as same_motion
+from .multibody import Mujoco as Mujoco, mujoco as mujoco

@@ -1,0 +1,1 @@
+"""Machines with known faults, the questions put to the command line, and the scores."""

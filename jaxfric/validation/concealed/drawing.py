@@ -1,0 +1,148 @@
+"""Drawing a machine, and what is concealed in it, from a seed."""
+
+import copy
+import dataclasses
+import zlib
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.random import Generator
+
+from .kinds import KINDS
+from .machines import (
+    SHAPES,
+    Machine,
+    draw_band,
+    draw_friction,
+    draw_loop,
+    draw_noise,
+    draw_plan,
+    log_uniform,
+    reference,
+    tied,
+)
+from .nominal import nominal
+from .physics import ABSENT
+from .tuning import BURST, tune
+
+# What the phase of the loop, or a large force of inertia, makes visible.
+_DYNAMIC = {
+    "transport_delay", "actuator_lag", "position_dependent_delay", "compliance",
+    "position_dependent_inertia", "load_dependent_friction", "actuator_saturation",
+    "gain_asymmetry", "acceleration_dependent_friction", "actuator_deadband",
+}  # fmt: skip
+_PHASE = {"transport_delay", "actuator_lag", "position_dependent_delay"}
+# How often a loop that bursts is made half as fast before it is given up.
+_SLOWER = 4
+
+
+def draw(
+    seed: int, effects: Sequence[str] = (), size: float | tuple[float, float] = (0.02, 0.30)
+) -> Machine:
+    """A machine drawn at random, with the effects named concealed in it.
+
+    **Arguments:** `seed`, zero or more: the same seed is the same machine, whatever is concealed,
+    but for what an effect needs to be seen (a large inertia, a slow loop); `effects`, names out of
+    [`NAMES`][] or [`OUTSIDE`][]; `size`, the root mean square of an effect's force over the
+    set-point's motion in parts of the Coulomb level: one number, or the range of a log-uniform
+    draw. What would not be physical any more is not made, so that the size in `Machine.truth` can
+    be smaller.
+
+    A loop that bursts with the effect is made slower.
+
+    **Raises:** `ValueError` for an effect that there is none of, or one named twice, or for a loop
+    that bursts however slow.
+    """
+    effects = tuple(effects)
+    _check(effects)
+    rng = np.random.default_rng((seed, 0))
+    plan = draw_plan(rng, seed)
+    time = np.arange(plan.samples) / plan.sample_rate
+    x, v = reference(plan, seed, 0)
+    coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))
+    shape = _shape(rng, effects)
+    friction = draw_friction(rng, coulomb, top, shape)
+    if "asymmetric_friction" in effects:
+        friction = tied(friction)
+    if "frictional_lag" in effects:
+        friction = _pronounced(friction, coulomb, top)
+    omega = draw_band(rng, plan, slowest=bool(_PHASE & set(effects)))
+    baseline = shape if shape and "stribeck" not in effects else "coulomb-viscous"
+    if "asymmetric_friction" in effects:
+        baseline = f"symmetric-{baseline}"
+
+    def driven(rng, omega) -> Machine:
+        # Coulomb friction may bend the loop by a twentieth of the stroke.
+        mass = max(_mass(rng, v, time, coulomb, effects), 20 * coulomb / (plan.stroke * omega**2))
+        loop, noise = draw_loop(rng, mass, coulomb, omega, plan)
+        physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
+        # Far above what the motion needs: a limit that is met would be an effect of its own.
+        hardest = mass * float(np.quantile(np.abs(np.gradient(v, time)), 0.999))
+        physics["limit"] = 8 * coulomb + 3 * hardest
+        blur = draw_noise(rng, coulomb, noise)
+        healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {})
+        return _with(healthy, effects, nominal(time, x, v, coulomb, physics, plan), size)
+
+    for _ in range(_SLOWER):
+        machine = driven(copy.deepcopy(rng), omega)
+        if all(truth["size"] < BURST for truth in machine.truth.values()):
+            return machine
+        # Nobody runs a loop that bursts: whoever tunes it lowers its gains.
+        omega /= 2
+    raise ValueError(f"The loop of machine {seed} with {', '.join(effects)} bursts.")
+
+
+def _with(machine: Machine, effects, n, size) -> Machine:
+    """The machine with effects, one after the other: each knows the friction of those before."""
+    for name in effects:
+        truth = _conceal(machine, name, n, size)
+        physics = {**machine.physics, **KINDS[name].physics(truth, machine.physics)}
+        both = (*machine.effects, name), {**machine.truth, name: truth}
+        machine = dataclasses.replace(machine, effects=both[0], physics=physics, truth=both[1])
+        n = n._replace(physics=physics)
+    return machine
+
+
+def _check(effects):
+    unknown = [name for name in effects if name not in KINDS]
+    if unknown:
+        raise ValueError(
+            f"No effect {', '.join(unknown)} can be concealed; there are {', '.join(KINDS)}."
+        )
+    if len(set(effects)) < len(effects):
+        raise ValueError(f"An effect is named twice: {', '.join(effects)}.")
+
+
+def _shape(rng: Generator, effects) -> str | None:
+    """The healthy machine's Stribeck curve, or `None`; one where friction's lag is to be seen."""
+    choice = (*SHAPES, None)[rng.integers(4)]
+    if "stribeck" in effects:
+        return None
+    if "frictional_lag" in effects and choice is None:
+        return SHAPES[0]
+    return choice
+
+
+def _pronounced(friction, coulomb, top):
+    """A high and wide bump: a narrow one is passed before its lag shows."""
+    wide = {f"bump{s}": max(friction[f"bump{s}"], 0.45 * coulomb) for s in "+-"}
+    wide |= {f"bump_speed{s}": max(friction[f"bump_speed{s}"], 0.1 * top) for s in "+-"}
+    return friction | wide
+
+
+def _mass(rng: Generator, v, time, coulomb, effects) -> float:
+    """The force of inertia (98 % of it) is 0.3 to 5 times Coulomb friction."""
+    ratio = log_uniform(rng, 0.3, 5.0)
+    if _DYNAMIC & set(effects):
+        ratio = max(ratio, 1.5 + 0.5 * ratio)
+    return ratio * coulomb / float(np.quantile(np.abs(np.gradient(v, time)), 0.98))
+
+
+def _conceal(machine, name, n, size):
+    rng = np.random.default_rng((machine.seed, 1, zlib.crc32(name.encode())))
+    low, high = size if isinstance(size, tuple) else (size, size)
+    kind, wanted = KINDS[name], log_uniform(rng, low, high)
+    truth = kind.draw(rng, n, wanted)
+    if kind.tuned:
+        truth = tune(machine, name, truth, n, wanted)
+    return {"size": kind.measure(truth, n), **truth, "where": kind.where(truth)}

@@ -1,0 +1,179 @@
+"""Recording a machine twice: once to identify, once held out."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...data.recording import Recording
+from . import physics, schedule
+from .kinds import KINDS
+from .machines import Machine, reference
+from .nominal import Nominal, direction, rms
+
+
+class Run(NamedTuple):
+    """Both recordings of a machine, and what nobody knows who only has them.
+
+    `recording`, `holdout`: with `position` as counted, `force` as measured and the channel
+    `reference`, without velocity; `neighbour_velocity` with `cross_axis`. `hidden`,
+    `hidden_holdout`: the force of each effect by name, N, `(N,)`: the part of the command beyond
+    the healthy machine's, mean over the sample that the command is held. `true`: both motions.
+    """
+
+    recording: Recording
+    holdout: Recording
+    hidden: dict[str, np.ndarray]
+    hidden_holdout: dict[str, np.ndarray]
+    true: tuple[physics.Motion, physics.Motion]
+
+
+def record(machine: Machine) -> Run:
+    """Both recordings of a machine in closed loop, always the same for the same machine.
+
+    The held-out one has a set-point and noise of its own, and often another kind of motion.
+
+    The arrays have the caller's precision; the simulation has double precision.
+    """
+    runs = simulate([(machine, 0), (machine, 1)])
+    logs = [_log(machine, run, number) for number, run in enumerate(runs)]
+    first, second = runs
+    return Run(logs[0], logs[1], first.hidden, second.hidden, (first.true, second.true))
+
+
+class Simulated(NamedTuple):
+    """One run: the clock s `(N,)`, the simulator's inputs and outputs, each effect's force N."""
+
+    clock: np.ndarray
+    inputs: physics.Inputs
+    true: physics.Motion
+    hidden: dict[str, np.ndarray]
+
+
+def simulate(runs: Sequence[tuple[Machine, int]]) -> list[Simulated]:
+    """Machines with one plan, each with the number of its run: 0 to identify, 1 held out."""
+    clocks = [_clock(machine, run) for machine, run in runs]
+    staged = [_stage(*which, clock) for which, clock in zip(runs, clocks, strict=True)]
+    inputs = [stage[0] for stage in staged]
+    substeps = runs[0][0].plan.substeps
+    true = physics.run([dict(machine.physics) for machine, _ in runs], inputs, substeps)
+    found = []
+    for i, (machine, run) in enumerate(runs):
+        hidden = _hide(machine, clocks[i], true[i], staged[i][1], run)
+        found.append(Simulated(clocks[i], inputs[i], true[i], hidden))
+    return found
+
+
+def _rng(machine, run, what):
+    return np.random.default_rng((machine.seed, 2, run, what))
+
+
+def _clock(machine: Machine, run: int) -> np.ndarray:
+    """The true times of the samples, s: even ones, each off by up to the jitter."""
+    count, rate = machine.plan.samples, machine.plan.sample_rate
+    off = _rng(machine, run, 0).uniform(-1, 1, count) * machine.noise.jitter
+    return (np.arange(count) + off - off[0]) / rate
+
+
+def _coloured(rng, count, samples):
+    """First-order autoregression with unit variance and that correlation time in samples."""
+    keep = float(np.exp(-1 / samples))
+    kicks = rng.normal(size=count) * np.sqrt(1 - keep**2)
+    kicks[0] = rng.normal()
+    # Blocks short enough for the powers of `keep` to stay far from underflow.
+    block = max(1, int(min(count, 20 * samples)))
+    found, last = np.empty(count), 0.0
+    for start in range(0, count, block):
+        part = kicks[start : start + block].copy()
+        part[0] += keep * last
+        powers = keep ** np.arange(part.size)
+        found[start : start + block] = powers * np.cumsum(part / powers)
+        last = found[start + part.size - 1]
+    return found
+
+
+def _stage(machine: Machine, run: int, clock: np.ndarray):
+    """Inputs of the simulator, and the load that the effects alone make."""
+    plan, noise = machine.plan, machine.noise
+    goal, speed = reference(plan, machine.seed, run)
+    even = np.arange(plan.samples) / plan.sample_rate
+    goal, speed = np.interp(clock, even, goal), np.interp(clock, even, speed)
+    interval = np.append(np.diff(clock), 1 / plan.sample_rate)
+    # The mean of a slow load over a sample is its value in the middle.
+    n = _motion(machine, clock + 0.5 * interval)
+    timed = schedule.columns(machine.truth, n, run)
+    correlation = noise.correlation * plan.sample_rate
+    process = noise.process * _coloured(_rng(machine, run, 1), plan.samples, correlation)
+    blur = noise.encoder * _rng(machine, run, 2).normal(size=plan.samples)
+    columns = (interval, goal, speed, timed.load + process, timed.coulomb, timed.viscous, blur)
+    return physics.Inputs(*columns), timed.load
+
+
+def _motion(machine: Machine, time, x=None, v=None, a=None) -> Nominal:
+    """A motion of a machine in the form that the effects' forces are functions of."""
+    zero = np.zeros_like(time)
+    x, v, a = (zero if each is None else each for each in (x, v, a))
+    top = float(np.quantile(np.abs(v), 0.98))
+    way = direction(v, top)
+    return Nominal(time, x, v, a, zero, way, top, machine.coulomb, machine.physics, machine.plan)
+
+
+# Effects that are friction of the simulator's baseline, and so no part of `Motion.hidden`.
+_INSIDE = {"asymmetric_friction", "stribeck"}
+
+# Effects whose force at a sample does not follow from the motion at that sample.
+_DYNAMIC = {
+    "presliding", "frictional_lag", "backlash", "compliance", "transport_delay", "actuator_lag",
+    "actuator_deadband", "actuator_saturation", "gain_asymmetry", "position_dependent_delay",
+    "hysteretic_spring", "load_dependent_friction", "acceleration_dependent_friction",
+}  # fmt: skip
+
+
+def _hide(machine: Machine, clock, true: physics.Motion, load, run):
+    """The force of each effect; what does not follow from the motion gets what the others leave.
+
+    Two such effects at once share it: each is given half.
+    """
+    names = machine.effects
+    n = _driven(machine, clock, true)
+    known = {name: _known(name, machine, n, run) for name in names if name not in _DYNAMIC}
+    inside = [known[name] for name in names if name in _INSIDE]
+    total = sum(inside, true.hidden + load)
+    if len(names) == 1:
+        return {names[0]: total}
+    rest = total - sum(known.values(), np.zeros_like(total))
+    share = 1 / max(len(names) - len(known), 1)
+    return {name: known.get(name, share * rest) for name in names}
+
+
+def _driven(machine, clock, true):
+    """The true motion in the middle of each sample."""
+    interval = np.append(np.diff(clock), 1 / machine.plan.sample_rate)
+    change = np.append(np.diff(true.velocity), 0.0)
+    v = true.velocity + 0.5 * change
+    x = true.position + 0.5 * interval * true.velocity
+    return _motion(machine, clock + 0.5 * interval, x, v, change / interval)
+
+
+def _known(name, machine, n, run):
+    truth = machine.truth[name]
+    if name in ("disturbance_pulses", "cross_axis"):
+        return schedule.columns({name: truth}, n, run).load
+    force = KINDS[name].force(truth, n)
+    if name == "asymmetric_friction":
+        return force + truth["coulomb_asymmetry"] * np.abs(n.way)
+    return force
+
+
+def _log(machine: Machine, found: Simulated, run: int) -> Recording:
+    clock = found.clock
+    force = machine.noise.force * _rng(machine, run, 3).normal(size=clock.size)
+    channels = {"reference": found.inputs.goal}
+    if "cross_axis" in machine.effects:
+        truth = machine.truth["cross_axis"]
+        speed, _ = schedule.neighbour(truth, machine.plan, run, clock)
+        noise = 1e-3 * rms(speed) * _rng(machine, run, 4).normal(size=clock.size)
+        channels["neighbour_velocity"] = speed + noise
+    name = f"machine {machine.seed}, {('identification', 'held out')[run]}"
+    true = found.true
+    return Recording(clock, true.force + force, true.counted, channels=channels, source=name)

@@ -1,0 +1,87 @@
+"""Which machines a proof consists of."""
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+
+from ...terms.effects import effect
+from ..concealed import NAMES, OUTSIDE
+
+# What is concealed, in the order of the cases: of every 24, 8 machines are healthy, 12 have one
+# effect, 3 have two, and one has an effect that the library has no term for.
+PATTERN = "hsshsp hsshsp hsshsp hsshso".replace(" ", "")
+KINDS = {"h": "healthy", "s": "single", "p": "pair", "o": "outside"}
+
+
+class Case(NamedTuple):
+    """One machine of a proof.
+
+    `name` of its files; `kind`: "healthy", "single", "pair" or "outside"; `seed` of the machine;
+    `effects` concealed in it; `size`: the range that `concealed.draw` draws their sizes from.
+    """
+
+    name: str
+    kind: str
+    seed: int
+    effects: tuple[str, ...]
+    size: tuple[float, float]
+
+
+def plan(cases: int, seed: int, size: tuple[float, float]) -> list[Case]:
+    """The cases of a seed; fewer cases are the first ones of more.
+
+    Single effects take turns: each name comes once before any comes again. So do the members of
+    pairs, of which none is declared confusable with the other in the catalogue, since nobody could
+    name both, and the effects outside the library.
+
+    **Raises:** `ValueError` if there is no case, or no such size.
+    """
+    if cases < 1 or seed < 0:
+        raise ValueError(f"{cases} cases of seed {seed}; give at least one, and a seed from zero.")
+    if not 0 < size[0] <= size[1]:
+        raise ValueError(f"sizes from {size[0]} to {size[1]}; give 0 < LOW ≤ HIGH.")
+    rng = np.random.default_rng((seed, 0))
+    rows = {
+        "healthy": itertools.repeat(()),
+        "single": ((name,) for name in turns(NAMES, np.random.default_rng((seed, 1)))),
+        "pair": _pairs(np.random.default_rng((seed, 2))),
+        "outside": ((name,) for name in turns(OUTSIDE, np.random.default_rng((seed, 3)))),
+    }
+    found = []
+    for number, letter in zip(range(cases), itertools.cycle(PATTERN), strict=False):
+        kind = KINDS[letter]
+        machine = int(rng.integers(2**31))
+        found.append(Case(f"{number + 1:05d}", kind, machine, next(rows[kind]), size))
+    return found
+
+
+def turns(names: tuple[str, ...], rng: Generator) -> Iterator[str]:
+    """Each name once in a random order, then again in another."""
+    while True:
+        yield from (names[i] for i in rng.permutation(len(names)))
+
+
+def _pairs(rng: Generator) -> Iterator[tuple[str, str]]:
+    """Two names at a time, the next in turn with the first of those after it that is unlike it."""
+    names = turns(NAMES, rng)
+    waiting: list[str] = []
+    while True:
+        first = waiting.pop(0) if waiting else next(names)
+        second = next((name for name in waiting if _unlike(first, name)), None)
+        if second is not None:
+            waiting.remove(second)
+        while second is None:
+            name = next(names)
+            if _unlike(first, name):
+                second = name
+            else:
+                waiting.append(name)
+        yield first, second
+
+
+def _unlike(first: str, second: str) -> bool:
+    alike = {*effect(first).confusable_with, first}, {*effect(second).confusable_with, second}
+    return second not in alike[0] and first not in alike[1]

@@ -1,0 +1,230 @@
+"""After is never worse than before, and bad recordings are not believed."""
+
+import dataclasses
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import models, predict, read, terms
+from jaxfric.cli import main
+from jaxfric.data import io
+from jaxfric.explanation import doubts, explain, improvement, question, regression
+from jaxfric.explanation.explained import DOUBTED
+from jaxfric.explanation.improvement import Errors
+from jaxfric.simulation.prediction import delay_of, force_error, in_motion, outliers
+
+from .test_explain import CASES, TIME, healthy, planted
+
+__all__ = ["healthy"]
+
+
+def with_force(recording, force):
+    return dataclasses.replace(recording, force=jnp.asarray(force))
+
+
+def by_hand(model, recording):
+    """What a user computes: the force error over the samples in motion."""
+    left = np.asarray(recording.force) - np.asarray(predict(model, recording))
+    moving = in_motion(recording, delay_of(model))
+    return np.linalg.norm(left[moving]) / np.linalg.norm(np.asarray(recording.force)[moving])
+
+
+def names(found):
+    return {warning["name"] for warning in found.warnings}
+
+
+def never_worse(found):
+    for key in ("force_error", "filtered_force_error"):
+        assert found.fit[key]["after"] <= found.fit[key]["before"] * (1 + 1e-6), key
+    for key in ("holdout_force_error", "filtered_holdout_force_error"):
+        if found.fit[key] is not None:
+            assert found.fit[key]["after"] <= found.fit[key]["before"] * (1 + 1e-6), key
+
+
+def test_the_figures_are_those_of_the_saved_model_and_a_subtraction(healthy):
+    run, held = (planted(each, *CASES["cogging"]) for each in healthy)
+    found = explain(run, "gaussian", held)
+    never_worse(found)
+    document = json.loads(json.dumps(found.to_dict()))
+    saved = models.Model.from_dict(document["model"])
+    errors, there = (document["fit"][key] for key in ("force_error", "holdout_force_error"))
+    assert document["fit"]["holdout_adjusted"] == {"left_out": [], "rephased": []}
+    for model, when in ((found.baseline, "before"), (saved, "after")):
+        assert by_hand(model, run) == pytest.approx(errors[when], rel=1e-9)
+        assert by_hand(model, held) == pytest.approx(there[when], rel=1e-9)
+        assert force_error(model, run) == pytest.approx(errors[when], rel=1e-9)
+    assert 0 < document["fit"]["noise_floor"] <= errors["after"]
+    assert f"{errors['before']:.2%} before, {errors['after']:.2%} after" in found.summary
+
+
+def test_the_command_prints_the_same_figure_and_writes_what_it_is_made_of(
+    healthy, tmp_path, capsys
+):
+    """With an effect on the predicted force, which the command works out by itself."""
+    run = jax.tree.map(lambda x: x[:6000], healthy[0])
+    model = models.from_parameters(
+        models.coulomb_viscous() + terms.GainAsymmetry(),
+        {"inertia": 5.0, "gain_asymmetry": 0.1}
+        | {f"{name}{sign}": value for sign in "+-" for name, value in
+           {"coulomb": 20.0, "viscous": 60.0}.items()},
+    )  # fmt: skip
+    log, out, document = (tmp_path / name for name in ("log.csv", "out.csv", "model.json"))
+    columns = {name: getattr(run, name) for name in ("time", "position", "force")}
+    io.write_table(log, columns)
+    document.write_text(json.dumps(model.to_dict()))
+    assert main(["predict", str(document), str(log), "-o", str(out)]) == 0
+    expected = force_error(model, read(log))
+    assert f"force error {expected:.2%}" in capsys.readouterr().out
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    moving = table["in_motion"] > 0
+    left, force = (table["measured_force"] - table["force"])[moving], table["measured_force"]
+    assert np.linalg.norm(left) / np.linalg.norm(force[moving]) == pytest.approx(expected, rel=1e-9)
+
+
+def test_findings_that_make_the_saved_model_worse_are_neither_named_nor_saved(healthy, monkeypatch):
+    """The one without which the recording's error is least goes first, then the next."""
+    run = planted(healthy[0], *CASES["cogging"])
+    here = improvement.Figures.here
+
+    def spoilt(figures, model, delay=None):
+        return here(figures, model) + 0.5 * ("pitch" in model.parameters)
+
+    monkeypatch.setattr(improvement.Figures, "here", spoilt)
+    found = explain(run, "gaussian")
+    never_worse(found)
+    assert found.verdict == "unexplained" and found.findings == []
+    assert found.model.parameters == found.baseline.parameters
+    assert names(found) == {"not_better"} and found.where
+    assert "with that the model is worse" in found.summary
+    assert not {each["effect"] for each in found.not_visible} & {"cogging"}
+
+
+def test_what_is_worse_by_any_figure_is_worse():
+    before = Errors(0.1, 0.2, 0.05, 0.06)
+    assert before.worse(before, 1e-8) == []
+    assert before._replace(held=0.21).worse(before, 1e-8) == ["held"]
+    assert before._replace(filtered=0.051, here=0.01).worse(before, 1e-8) == ["filtered"]
+    assert before._replace(here=float("nan")).worse(before, 1e-8) == ["here"]
+    assert Errors(0.1, None, 0.05, None).worse(Errors(0.1, None, 0.05, None), 0.0) == []
+
+
+@pytest.mark.slow
+def test_a_wave_at_another_phase_is_judged_at_that_phase(healthy):
+    """The encoder's zero moves with each homing: the saved model holds the phase of its own log."""
+    run = planted(healthy[0], *CASES["cogging"])
+    term, alpha, beta = CASES["cogging"]
+    held = planted(healthy[1], term, (-alpha[0], -alpha[1]), beta)
+    found = explain(run, "gaussian", held)
+    never_worse(found)
+    assert [f.effect for f in found.findings] == ["cogging"]
+    assert found.fit["holdout_adjusted"]["rephased"] == ["cogging"]
+    after = found.fit["holdout_force_error"]["after"]
+    assert by_hand(found.holdout_model, held) == pytest.approx(after, rel=1e-9)
+    there = models.Model.from_dict(found.to_dict()["holdout_model"])
+    assert by_hand(there, held) == pytest.approx(after, rel=1e-9)
+    assert "on the held-out recording (cogging at another phase)" in found.summary
+    assert by_hand(found.model, held) > found.fit["holdout_force_error"]["before"] > after
+
+
+def test_a_force_of_the_wrong_sign_is_said_to_be(healthy):
+    found = explain(with_force(healthy[0], -healthy[0].force))
+    assert found.verdict == "unexplained" and found.findings == []
+    assert names(found) == {"wrong_sign"} and found.warnings[0]["severe"]
+    assert found.summary.startswith("The force drives the axis") and DOUBTED in found.summary
+    assert found.to_dict()["warnings"] == found.warnings
+    never_worse(found)
+
+
+def test_a_dead_sensor_is_not_consistent(healthy):
+    noise = np.random.default_rng(5).normal(size=TIME.size)
+    found = explain(with_force(healthy[0], noise))
+    assert found.verdict == "unexplained" and names(found) == {"not_described"}
+    assert found.fit["force_error"]["after"] > 0.95
+    assert "Force error" in found.summary and "sensor" in found.summary
+    never_worse(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("late", "which"), [(1000, "late"), (-300, "early")])
+def test_a_force_written_beside_another_moment_is_said_to_be(healthy, late, which):
+    moved = with_force(healthy[0], np.roll(np.asarray(healthy[0].force), late))
+    cut = slice(late, None) if late > 0 else slice(0, late)
+    found = explain(jax.tree.map(lambda x: x[cut], moved))
+    assert found.verdict == "unexplained" and names(found) == {"late_force"}
+    assert f"{abs(late) / 1000:.2g} s too {which}" in found.summary
+    assert found.findings == []
+    never_worse(found)
+
+
+def test_one_spike_of_a_million_newtons_changes_nothing_else(healthy):
+    force = np.asarray(healthy[0].force).copy()
+    plain = force_error(models.from_parameters(models.coulomb_viscous(), PLAIN), healthy[0])
+    force[12345] = 1e6
+    spiked = with_force(healthy[0], force)
+    assert np.flatnonzero(outliers(spiked)).tolist() == [12345]
+    assert force_error(
+        models.from_parameters(models.coulomb_viscous(), PLAIN), spiked
+    ) == pytest.approx(plain, rel=1e-3)
+    found = explain(spiked)
+    assert found.verdict == "consistent" and names(found) == {"force_spikes"}
+    assert "12.345 s" in found.warnings[-1]["text"]
+    assert found.fit["force_error"]["after"] < 0.05
+    assert float(found.model.parameters["coulomb+"]) == pytest.approx(22.0, rel=0.02)
+
+
+PLAIN = {"inertia": 5.0} | {
+    f"{name}{sign}": value
+    for sign in "+-"
+    for name, value in {"coulomb": 20.0, "viscous": 60.0}.items()
+}
+
+
+def test_what_lasts_or_is_usual_is_no_outlier(healthy):
+    assert not outliers(healthy[0]).any()
+    force = np.asarray(healthy[0].force).copy()
+    force[5000:5010] += 1e4  # a crash of ten milliseconds
+    assert not outliers(with_force(healthy[0], force)).any()
+    assert not outliers(with_force(healthy[0], np.zeros(TIME.size))).any()
+
+
+def clipped(recording, part):
+    force = np.asarray(recording.force)
+    most = part * np.quantile(np.abs(force), 0.98)
+    return with_force(recording, np.clip(force, -most, most))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", [0.35, 0.6, 0.85])
+def test_a_clipped_force_makes_no_model_worse(healthy, part):
+    found = explain(clipped(healthy[0], part), "gaussian", healthy[1])
+    never_worse(found)
+    assert found.verdict in ("unexplained", "partly_explained")
+
+
+def test_a_constant_load_is_no_friction_that_drives(healthy):
+    """A weight of 100 N makes a Coulomb level of one direction negative, and no axis of it."""
+    lifted = with_force(healthy[0], healthy[0].force + 100.0)
+    asked = question.ask(lifted, None, models.gaussian())
+    assert min(float(a) for a in asked.base.alphas[0]) < -50
+    assert not doubts.drives(asked.base, asked.evidence, asked.block)
+    turned = question.ask(with_force(lifted, -lifted.force), None, models.gaussian())
+    assert doubts.drives(turned.base, turned.evidence, turned.block)
+    assert regression.fast(asked.base) == pytest.approx(regression.fast(turned.base), rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("baseline", ["gaussian", "exponential", "coulomb-viscous"])
+@pytest.mark.parametrize("force", ["desired_current", "current"])
+def test_a_robots_joint_is_never_made_worse(data_folder, baseline, force):
+    """Once 3.8 to 10.1 %: a bump over speeds that no row had."""
+    path = data_folder / "ur10e" / "joint_1.csv"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    reading = {"columns": {"force": force, "position": "position", "velocity": None}}
+    run = read(path, **reading, units={"force": "A", "position": "rad"})
+    found = explain(run, baseline)
+    never_worse(found)
+    assert by_hand(found.model, run) == pytest.approx(found.fit["force_error"]["after"], rel=1e-9)

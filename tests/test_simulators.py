@@ -1,0 +1,241 @@
+"""Another simulator's force as it is: what agrees stays, what is wrong is named, nothing else."""
+
+import dataclasses
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import cli, explain, models, predict, simulators, terms
+from jaxfric.explanation.baseline import _fewest
+from jaxfric.simulators import Known, Mujoco
+from jaxfric.terms import KNOWN_FORCE
+from tests.test_explain import CASES, PARAMETERS, healthy, planted
+
+__all__ = ["healthy"]
+
+MACHINE = models.from_parameters(models.gaussian(), PARAMETERS)
+
+
+def simulator(**wrong):
+    """The machine's own force along a motion, with other values."""
+    model = models.from_parameters(models.gaussian(), PARAMETERS | wrong)
+    return lambda recording: predict(model, recording)
+
+
+def test_a_simulator_that_is_right_stays_as_it_is(healthy):
+    found = explain(healthy[0], simulator(), healthy[1])
+    assert found.verdict == "consistent" and found.findings == []
+    assert found.baseline_name == "simulator"
+    assert not any(float(value) for value in found.model.parameters.values())
+
+
+def test_one_wrong_value_is_one_wrong_value(healthy):
+    wrong = simulator(**{"viscous+": 90.0, "viscous-": 78.0})  # both 24 too large
+    found = explain(healthy[0], wrong, healthy[1])
+    (finding,) = found.findings
+    assert finding.effect == "parameter_mismatch" and set(finding.parameters) == {"viscous"}
+    moved = finding.parameters["viscous"]
+    assert moved.before == 0 and abs(moved.value + 24) < 2.4 * max(moved.standard_error, 0.3)
+    assert "viscous is" in finding.sentence and "less" in finding.sentence
+    errors = found.fit["filtered_holdout_force_error"]
+    assert errors["after"] < 0.2 * errors["before"]
+    assert found.verdict == "explained"
+
+
+def test_a_torque_constant_is_a_gain_and_nothing_else(healthy):
+    louder = [dataclasses.replace(run, force=1.15 * run.force) for run in healthy]
+    found = explain(louder[0], simulator(), louder[1])
+    (finding,) = found.findings
+    assert set(finding.parameters) == {"gain"}
+    assert float(finding.parameters["gain"].value) == pytest.approx(0.15, rel=0.02)
+
+
+def test_missing_physics_beside_a_wrong_value(healthy):
+    """The values are judged beside what is missing, not instead of it."""
+    runs = [planted(run, *CASES["cogging"]) for run in healthy]
+    found = explain(runs[0], simulator(inertia=4.0), runs[1])
+    named = {finding.effect: finding for finding in found.findings}
+    assert set(named) == {"cogging", "parameter_mismatch"}
+    moved = named["parameter_mismatch"].parameters
+    assert set(moved) == {"inertia"}
+    assert float(moved["inertia"].value) == pytest.approx(1.0, rel=0.02)
+    assert float(named["cogging"].parameters["pitch"].value) == pytest.approx(0.01, rel=1e-3)
+
+
+def test_the_saved_model_stands_on_the_simulators_force(healthy, tmp_path):
+    run = planted(healthy[0], *CASES["spring"])
+    found = explain(run, simulator())
+    again = models.Model.from_dict(json.loads(json.dumps(found.model.to_dict())))
+    beside = Known(simulator()).beside(run)
+    left = np.asarray(run.force) - np.asarray(predict(again, beside))
+    moving = np.abs(np.gradient(np.asarray(run.position))) > 5e-5
+    before = np.asarray(run.force) - np.asarray(simulator()(run))
+    assert np.std(left[moving]) < 0.5 * np.std(before[moving])
+    with pytest.raises(ValueError, match="known_force"):
+        predict(again, run)
+
+
+def test_arrays_channels_and_functions_say_the_same(healthy):
+    force = np.asarray(simulator()(healthy[0]))
+    ways = [
+        Known(force).beside(healthy[0]),
+        Known(simulator()).beside(healthy[0]),
+        Known().beside(simulators.along(healthy[0], force)),
+    ]
+    for way in ways:
+        np.testing.assert_array_equal(way.channels[KNOWN_FORCE], force)
+    with pytest.raises(ValueError, match="samples"):
+        Known(force[:-1]).beside(healthy[0])
+    with pytest.raises(ValueError, match="held-out recording|run 1"):
+        Known(force).beside(healthy[1], held_out=True)
+    gone = np.where(np.arange(force.size) < 100, np.nan, force)
+    assert not np.asarray(Known(gone).beside(healthy[0]).mask)[:100].any()
+
+
+def test_a_baseline_without_it_does_not_read_the_simulators_force(healthy):
+    run = simulators.along(healthy[0], np.zeros(healthy[0].num_samples))
+    ours, theirs = explain(run, "gaussian"), explain(healthy[0], "gaussian")
+    assert ours.fit == theirs.fit and KNOWN_FORCE not in str(ours.model)
+
+
+def test_a_revolute_axis_has_gravity_and_a_spring_too():
+    rotary = Known().model((("force", "N·m"), ("position", "rad")))
+    assert {"gravity_sin", "gravity_cos", "stiffness", "gain"} <= set(rotary.parameters)
+    assert "gravity_sin" not in Known().model((("force", "N"), ("position", "m"))).parameters
+
+
+def test_the_fewest_columns_are_enough():
+    """Of columns that resemble each other the one that is the difference, and it alone."""
+    draw = np.random.default_rng(0)
+    q = np.linspace(-0.8, 0.8, 600)
+    columns = np.stack([q, np.sin(q), np.cos(q), np.ones_like(q), np.sign(np.sin(40 * q))], axis=1)
+    block = np.arange(600) // 25
+    noise = 0.003 * draw.normal(size=600)
+    assert _fewest(columns, 1.5 * q + noise, block, 0.0) == [0]
+    assert _fewest(columns, np.sin(q) + noise, block, 0.0) == [1]
+    both = -0.4 * columns[:, 2] + 0.3 * columns[:, 4]
+    assert sorted(_fewest(columns, both + noise, block, 0.0)) == [2, 4]
+    assert _fewest(columns, noise, block, 0.0) == []
+
+
+# ---- the command ----
+
+
+def written(path, recording, force):
+    table = np.stack([recording.time, recording.position, force], axis=1)[:6000]
+    np.savetxt(path, table, delimiter=",", header="time,position,force", comments="", fmt="%.9g")
+    return str(path)
+
+
+@pytest.mark.slow
+def test_the_command_takes_the_force_from_a_file(healthy, tmp_path, capsys):
+    runs = [planted(run, *CASES["cogging"]) for run in healthy]
+    logs = [written(tmp_path / f"log{i}.csv", r, r.force) for i, r in enumerate(runs)]
+    ours = [written(tmp_path / f"sim{i}.csv", r, simulator()(r)) for i, r in enumerate(healthy)]
+    options = ["--holdout", logs[1], "--simulation", ours[0], "--simulation-holdout", ours[1]]
+    assert cli.main(["explain", logs[0], *options, "--json", str(tmp_path / "out.json")]) == 0
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert [finding["effect"] for finding in document["findings"]] == ["cogging"]
+    assert document["baseline"]["name"] == "simulator"
+    swapped = ["--simulation", ours[0], "--simulation-holdout", ours[0], "--holdout", logs[1]]
+    assert cli.main(["explain", logs[0], *swapped]) == 2
+    assert "is not the motion of" in capsys.readouterr().err
+
+
+def test_options_that_do_not_go_together_are_refused(tmp_path, capsys):
+    log = tmp_path / "log.csv"
+    t = np.arange(200) / 100
+    table = np.stack([t, np.sin(t), np.cos(t)], axis=1)
+    np.savetxt(log, table, delimiter=",", header="time,position,force", comments="")
+    assert cli.main(["explain", str(log), "--joint", "elbow"]) == 2
+    assert "--mujoco" in capsys.readouterr().err
+    assert cli.main(["explain", str(log), "--simulation-holdout", str(log)]) == 2
+    assert "--simulation" in capsys.readouterr().err
+
+
+# ---- MuJoCo ----
+
+PENDULUM = """<mujoco><option timestep="0.001"/><worldbody><body><joint name="elbow" axis="0 1 0"
+  damping="{damping}" frictionloss="0.2" armature="0.02"/>
+  <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="{mass}"/></body></worldbody>
+  </mujoco>"""
+
+
+def swung(model, seed, seconds=12.0):
+    """A recording of a joint that follows sine waves, with encoder counts and torque noise."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(model)
+    data, draw = mujoco.MjData(model), np.random.default_rng(seed)
+    rates, sizes = 2 * np.pi * np.array([0.3, 0.7, 1.3]), np.array([0.5, 0.2, 0.1])
+    phases = draw.uniform(0, 2 * np.pi, 3)
+    data.qpos[0], data.qvel[0] = sizes @ np.sin(phases), (sizes * rates) @ np.cos(phases)
+    rows = []
+    for step in range(round(seconds / model.opt.timestep)):
+        angle = rates * step * model.opt.timestep + phases
+        goal, speed = sizes @ np.sin(angle), (sizes * rates) @ np.cos(angle)
+        force = 60 * (goal - data.qpos[0]) + 4 * (speed - data.qvel[0]) + data.qfrc_bias[0]
+        rows.append((step * model.opt.timestep, force, data.qpos[0]))
+        data.qfrc_applied[0] = force
+        mujoco.mj_step(model, data)
+    time, force, position = np.array(rows)[::2].T
+    count = 2 * np.pi / 2**17
+    noisy = force + 0.02 * draw.normal(size=force.size)
+    units = {"force": "N·m", "position": "rad"}
+    return simulators.known.Recording(time, noisy, count * np.round(position / count), units=units)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "moved"),
+    [({}, {}), ({"damping": 0.6}, {"viscous": 0.3}), ({"mass": 1.3}, {"inertia": None})],
+)
+def test_a_wrong_value_of_a_mujoco_model(change, moved):
+    values = {"damping": 0.3, "mass": 1.0}
+    plant, nominal = PENDULUM.format(**values | change), PENDULUM.format(**values)
+    run, held = swung(plant, 1), swung(plant, 2)
+    found = explain(run, Mujoco(nominal), held)
+    if not moved:
+        assert found.verdict == "consistent" and found.findings == []
+        return
+    (finding,) = found.findings
+    names = set(finding.parameters)
+    if "mass" in change:  # a heavier rod has more inertia and more weight
+        assert names == {"inertia", "gravity_cos"}
+        assert float(finding.parameters["inertia"].value) == pytest.approx(0.3 * 0.03, rel=0.1)
+    else:
+        assert names == set(moved)
+        assert float(finding.parameters["viscous"].value) == pytest.approx(0.3, rel=0.01)
+    errors = found.fit["filtered_holdout_force_error"]
+    assert errors["after"] < 0.05 * errors["before"]
+
+
+def test_models_that_no_log_of_an_axis_fits_are_refused():
+    pytest.importorskip("mujoco")
+    with pytest.raises(ValueError, match="no such file"):
+        Mujoco("nowhere.xml")
+    with pytest.raises(ValueError, match="cannot read"):
+        Mujoco("<mujoco><nonsense/></mujoco>")
+    two = (
+        '<mujoco><worldbody><body><joint name="a"/><geom size="0.1"/><body pos="1 0 0">'
+        '<joint name="b"/><geom size="0.1"/></body></body></worldbody></mujoco>'
+    )
+    with pytest.raises(ValueError, match="2 joints: a, b"):
+        Mujoco(two)
+    with pytest.raises(ValueError, match="no joint 'c'"):
+        Mujoco(two, "c")
+    free = '<mujoco><worldbody><body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+    with pytest.raises(ValueError, match="free or a ball"):
+        Mujoco(free)
+    t = np.arange(100) / 100
+    alone = simulators.known.Recording(t, t, jnp.sin(t), units={"position": "rad"})
+    with pytest.raises(ValueError, match="joint 'b'"):
+        Mujoco(two, "a")(alone)
+
+
+def test_without_mujoco_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
+    with pytest.raises(ValueError, match=r"jaxfric\[mujoco\]"):
+        Mujoco("arm.xml")
+    assert terms.KnownForce().affine == ()
