@@ -168,7 +168,8 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
 def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
     """Numbers of the fewest columns that leave what all of them leave, N², but for `enough`.
 
-    Of every size the best subset; none of whose columns is within its interval of nothing.
+    Of every size the best subset; none of whose columns is within its interval of nothing. Where
+    more than `MOST_WRONG` are needed, it is another machine, and all of them.
     """
     size = np.linalg.norm(own, axis=0)
     used = np.flatnonzero(size > 0)
@@ -186,6 +187,8 @@ def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float)
         if not _sure(columns[:, better], left, block):
             break
         found = better
+    if len(found) == MOST_WRONG and most - _taken(gram, pull, found) >= enough:
+        return used.tolist()
     return [int(used[i]) for i in found]
 
 
