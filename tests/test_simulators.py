@@ -120,6 +120,15 @@ def test_the_fewest_columns_are_enough():
     assert _fewest(columns, noise, block, 0.0) == []
 
 
+def test_another_machine_has_all_its_values_moved():
+    draw = np.random.default_rng(0)
+    columns = draw.normal(size=(600, 8))
+    difference = columns[:, :7] @ np.ones(7) + 0.01 * draw.normal(size=600)
+    block = np.arange(600) // 25
+    enough = 1e-3 * float(difference @ difference)
+    assert _fewest(columns, difference, block, enough) == list(range(8))
+
+
 # ---- the command ----
 
 
