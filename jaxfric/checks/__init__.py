@@ -1,6 +1,6 @@
 """What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
 
-from .fitted import Design as Design, fitted as fitted
+from .fitted import MATTERS as MATTERS, Design as Design, fitted as fitted
 from .kinds import (
     KINDS as KINDS,
     NAMES as NAMES,

@@ -7,9 +7,9 @@ from ..data.recording import Recording
 from ..signals.polynomial import white_noise
 from .kinds import places
 
-# A derived velocity is off by this at the most, of its own size; a corner of the motion makes the
-# estimate of the error too small by up to three, so that 1 % is meant.
-UNCERTAIN = 0.005
+# A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
+# small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
+UNCERTAIN = 0.01 / 2**0.5
 # The position's increments that a velocity is compared with are this many times their noise.
 ABOVE_NOISE = 30.0
 # Two columns with less than half of their power in common are not the same motion.

@@ -66,6 +66,11 @@ class Evidence(NamedTuple):
     width: int
     clock: bool
 
+    @property
+    def peak(self) -> float:
+        """The largest force at the nodes, N."""
+        return float(np.nanmax(np.abs(np.asarray(self.motion.force)[: self.nodes])))
+
     def project(self, plain: Any, momentum: Any = None) -> np.ndarray:
         """Values at the nodes, `(..., M)`, as rows, `(..., J)`; `momentum` is differentiated."""
         rows = _weigh(np.asarray(plain), self.rows, self.average)

@@ -201,16 +201,17 @@ LARGE = 0.3
 
 
 def _by_sample(fit: Mapping[str, Any]) -> str:
-    """That what a model predicts sample by sample is mostly the noise of the acceleration."""
+    """What most of a large error is that no filter leaves: noise, or friction beside standstill."""
     if "filtered_force_error" not in fit:
         return ""
     whole, filtered = fit["force_error"]["after"], fit["filtered_force_error"]["after"]
     if not whole > LARGE or filtered > 0.5 * whole:
         return ""
-    return (
-        f" Sample by sample most of it is the noise of the acceleration: {filtered:.2%} is left "
-        "through a filter."
-    )
+    if (floor := fit.get("noise_floor")) is not None and floor**2 > 0.5 * whole**2:
+        what = "the noise of the acceleration"
+    else:
+        what = "left beside standstill and reversals, for which the values are no good"
+    return f" Sample by sample most of it is {what}: {filtered:.2%} is left through a filter."
 
 
 def _adjusted(fit: Mapping[str, Any]) -> str:

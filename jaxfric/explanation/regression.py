@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..terms.base import AbstractTerm
+from ..terms.base import AbstractTerm, summands
+from ..units import FORCE
 from .evidence import Evidence
 
 # A column of which less than this is left after the others is not told from them.
@@ -87,11 +88,42 @@ def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(columns / size, target, rcond=RANK)[0] / size
 
 
+def _forces_of_bumps(terms: Sequence[AbstractTerm]) -> np.ndarray:
+    """Which affine parameters are forces of friction with a shape that is searched, `(p,)`."""
+    parts = [part for term in terms for part in summands(term)]
+    return np.concatenate(
+        [
+            [
+                bool(part.nonlinear) and part.coordinates == {"velocity"} and p.dimension == FORCE
+                for p in part.affine
+            ]
+            for part in parts
+        ]
+        or [np.zeros(0, bool)]
+    ).astype(bool)
+
+
+def bounded(columns: np.ndarray, target: np.ndarray, which: np.ndarray, peak: float) -> np.ndarray:
+    """As [`solve`][], some of the coefficients being no larger than `peak`.
+
+    An axis that moved was held by no more friction than the largest force there was. Between
+    reversals a filter sees next to nothing of a narrow bump and would take any height for it.
+    """
+    alpha = solve(columns, target)
+    held = np.zeros(len(alpha), bool)
+    while (beyond := which & ~held & (np.abs(alpha) > peak)).any():
+        held |= beyond
+        alpha = np.where(held, np.clip(alpha, -peak, peak), 0.0)
+        alpha[~held] = solve(columns[:, ~held], target - columns @ alpha)
+    return alpha
+
+
 class Beside:
     """Evidence with the span of some columns taken out of target and columns alike."""
 
     def __init__(self, evidence: Evidence, basis: np.ndarray):
         self.basis, self.evidence, self.limits = basis, evidence, evidence.limits
+        self.peak = evidence.peak
         self.target = evidence.target - basis @ (basis.T @ evidence.target)
 
     def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
@@ -105,6 +137,7 @@ class Remembered:
 
     def __init__(self, rows: "Evidence | Beside"):
         self.rows, self.limits, self.target = rows, rows.limits, rows.target
+        self.peak = rows.peak
         self._known: dict[tuple[int, bytes], np.ndarray] = {}
 
     def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
@@ -209,7 +242,7 @@ def _at(terms, evidence, space, place, derivatives=False) -> Fit:
         columns.append(rows[0])
         moved.append((rows[1:] - rows[:1], inner))
     whole = np.concatenate(columns, axis=1)
-    alpha = solve(whole, evidence.target)
+    alpha = bounded(whole, evidence.target, _forces_of_bumps(terms), evidence.peak)
     residual = evidence.target - whole @ alpha
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     alphas = tuple(alpha[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True))

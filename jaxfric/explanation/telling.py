@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import Remark
+from ..checks import MATTERS, Remark
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
@@ -115,12 +115,17 @@ def _doubts(asked: Question, better: Improved, units) -> list[Remark]:
 
 
 def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
-    """That the held-out recording obeys other values of the same model."""
+    """That the held-out recording obeys other values of the same model, where that matters.
+
+    Less is told in the summary alone.
+    """
     held, refitted = (
         errors["filtered_holdout_force_error"],
         errors["filtered_holdout_refitted_error"],
     )
     if refitted is None or not held["after"] > ELSEWHERE * refitted:
+        return []
+    if held["after"] ** 2 - refitted**2 < MATTERS**2:
         return []
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 
 from . import motions
-from .logs import PLAIN, Log, Pair, log_uniform
+from .logs import PLAIN, TRUE_VELOCITY, Log, Pair, log_uniform
 
 # Rows of a log: few lengths, so that few programs are compiled.
 LENGTHS = (4000, 8000)
@@ -146,6 +146,7 @@ def _run(rng, axis: _Axis, offset, goal, time, finer, logger: _Logger) -> dict[s
     blur = logger.noise * rng.normal(size=counted.size)
     return {
         "time": time[log], "position": counted, "velocity": filtered[log],
+        TRUE_VELOCITY: np.gradient(x, step)[log],
         "force": force[log] + blur, "reference": goal[log],
     }  # fmt: skip
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.random import Generator
 
 from . import motions
-from .logs import PLAIN, Log, Pair, log_uniform
+from .logs import PLAIN, TRUE_VELOCITY, Log, Pair, log_uniform
 
 SAMPLES = 4000
 
@@ -68,5 +68,5 @@ def _run(rng, xml, goal, time, mass, omega, finer, coulomb) -> dict[str, np.ndar
     blur = log_uniform(rng, 0.003, 0.02) * coulomb * rng.normal(size=time.size)
     return {
         "time": time, "position": count * np.round(x / count), "velocity": v,
-        "force": force + blur, "reference": goal,
+        "force": force + blur, "reference": goal, TRUE_VELOCITY: v,
     }  # fmt: skip

@@ -11,6 +11,9 @@ from .mistake import Mistake
 OUTCOMES = ("right", "refused", "warned", "rescaled", "wrong in silence", "crashed")
 # Verdicts that say that something is left.
 UNSURE = ("unexplained", "partly_explained")
+# Warnings that a velocity may be off by more than a hundredth: true where it is.
+OF_THE_DERIVATIVE = {"velocity_noise", "coarse_sampling"}
+UNRESOLVED = 0.01
 # A figure is wrong from a quarter on.
 QUARTER = 0.25
 # Parameters are compared as forces: viscous friction at the top speed, inertia at the hardest

@@ -8,7 +8,7 @@ from ...data.recording import Recording
 from ...simulation import control
 from ...simulation.simulating import simulate
 from . import motions
-from .logs import PLAIN, Log, Pair, log_uniform
+from .logs import PLAIN, TRUE_VELOCITY, Log, Pair, log_uniform
 
 # One length and a fixed number of steps a sample: one compiled program a model.
 SAMPLES = 4000
@@ -63,5 +63,5 @@ def _run(rng, model, goal, time, loop, speed) -> dict[str, np.ndarray]:
     return {
         "time": time, "position": count * np.round(np.asarray(run.position) / count),
         "velocity": velocity, "force": force + 0.1 * rng.normal(size=time.size),
-        "reference": goal,
+        "reference": goal, TRUE_VELOCITY: np.asarray(run.velocity),
     }  # fmt: skip

@@ -10,6 +10,8 @@ from numpy.random import Generator
 
 # Roles in the order in which they are written.
 ROLES = ("time", "position", "velocity", "force", "reference")
+# Beside them, what no file holds: by it is judged what is said of a derivative.
+TRUE_VELOCITY = "true velocity"
 # Names that loggers give the columns; each set states no unit.
 PLAIN = (
     {"time": "time", "position": "position", "velocity": "velocity", "force": "force"},
@@ -74,7 +76,7 @@ class Log(NamedTuple):
         """The same axis in other units: every column and the truth change together."""
         speed = position / time
         factors = {"time": time, "position": position, "reference": position}
-        factors |= {"velocity": speed, "force": force}
+        factors |= {"velocity": speed, TRUE_VELOCITY: speed, "force": force}
         kinds = {"coulomb": force, "stribeck_force": force, "viscous": force / speed}
         kinds |= {"inertia": force * time / speed, "stribeck_velocity": speed}
         return self._replace(

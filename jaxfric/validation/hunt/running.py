@@ -9,10 +9,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from ... import signals
+from ...data.recording import Recording
 from . import judging
 from .cases import Case, Made, make
 from .judging import Ran, Verdict
-from .logs import Log, spelled
+from .logs import TRUE_VELOCITY, Log, spelled
 
 Command = Callable[[Sequence[str]], int]
 
@@ -42,6 +46,10 @@ def hunt(case: Case, command: Command, folder: Path, explain: bool = True) -> di
         verdicts["explain"] = judging.explained(ran, made.log, made.mistake)
     verdict = judging.worst(list(verdicts.values()))
     answer = _described(case, made, verdict, verdicts)
+    if made.mistake is None and judging.OF_THE_DERIVATIVE & {
+        s for v in verdicts.values() for s in v.signs
+    }:
+        answer["velocity_error"] = _velocity_error(made.log)
     if verdict.outcome == "wrong in silence" and made.mistake is not None:
         answer["own"] = _own(made, command, folder)[0].outcome
     return answer | {"seconds": time.monotonic() - start}
@@ -61,6 +69,14 @@ def _described(case: Case, made: Made, verdict: Verdict, verdicts) -> dict[str, 
         "outcome": verdict.outcome,
         "commands": {name: each._asdict() for name, each in verdicts.items()},
     }
+
+
+def _velocity_error(log: Log) -> float:
+    """How far the velocity of a position is from the true one, of its root mean square."""
+    recording = Recording(*(log.columns[role] for role in ("time", "force", "position")))
+    true = log.columns[TRUE_VELOCITY]
+    wrong = np.asarray(signals.prepare(recording).velocity) - true
+    return float(np.sqrt(np.nanmean(wrong**2) / np.mean(true**2)))
 
 
 def _with_own(ran: Ran, made: Made, command: Command, folder: Path) -> Verdict:

@@ -11,7 +11,7 @@ from numpy.random import Generator
 
 from .. import concealed
 from . import bench, joint, library
-from .logs import PLAIN, Log, Pair
+from .logs import PLAIN, TRUE_VELOCITY, Log, Pair
 
 # A longer log is cut to one of these lengths: few programs are compiled.
 LENGTHS = (8_000, 4_000)
@@ -44,8 +44,12 @@ def draw_concealed(rng: Generator) -> Pair:
             "time": recording.time, "position": recording.position, "force": recording.force,
             "reference": recording.channels["reference"],
             "velocity": true.velocity + 1e-3 * top * rng.normal(size=plan.samples),
+            TRUE_VELOCITY: true.velocity,
         }  # fmt: skip
         columns = {role: np.asarray(x, float)[:count] for role, x in columns.items()}
+        # The force is held from its sample to the next: the mean of both neighbours is centred.
+        force = columns["force"]
+        columns["force"] = 0.5 * (force + np.append(force[0], force[:-1]))
         logs.append(Log(columns, names, truth, top, hard, cycle, machine.baseline, about))
     return Pair(*logs)
 

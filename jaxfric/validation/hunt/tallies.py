@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from .judging import OUTCOMES, UNSURE
+from .judging import OF_THE_DERIVATIVE, OUTCOMES, UNRESOLVED, UNSURE
 
 Answer = Mapping[str, Any]
 
@@ -45,7 +45,8 @@ def false_warnings(answers: Iterable[Answer]) -> list[Answer]:
     """Healthy logs that were refused or warned of.
 
     A Stribeck velocity on its border, a column that is not excited, a refinement that did not end
-    say that the recording does not determine that model: no warning of the log.
+    say that the recording does not determine that model: no warning of the log. That the velocity
+    is off by more than a hundredth is a fault of the log where it is.
     """
     return [a for a in answers if a["family"] == "healthy" and _flagged(a)]
 
@@ -54,14 +55,18 @@ UNDETERMINED = {"on_border", "not_converged", "not_excited", "open_windows"}
 
 
 def _flagged(answer: Answer) -> bool:
-    return any(map(_beware, answer["commands"].values()))
+    return any(_beware(verdict, answer) for verdict in answer["commands"].values())
 
 
-def _beware(verdict: Answer) -> bool:
-    """Whether a command refused or warned; that something is left unexplained is no warning."""
+def _beware(verdict: Answer, answer: Answer) -> bool:
+    """Whether a command refused or warned; that something is left unexplained is no warning, nor
+    that a finding was dropped since it made the model worse.
+    """
     signs = set(verdict["signs"])
+    if answer.get("velocity_error", 0.0) > UNRESOLVED:
+        signs -= OF_THE_DERIVATIVE
     undetermined = verdict["outcome"] == "refused" and signs <= UNDETERMINED
-    no_warning = verdict["outcome"] == "warned" and signs <= set(UNSURE)
+    no_warning = verdict["outcome"] == "warned" and signs <= {*UNSURE, "not_better"}
     return verdict["outcome"] in ("refused", "warned") and not (undetermined or no_warning)
 
 
@@ -97,7 +102,7 @@ def _silent(answers: Sequence[Answer]) -> Iterable[str]:
 
 def _false(answers: Sequence[Answer]) -> Iterable[str]:
     for a in false_warnings(answers):
-        said = [(n, v["signs"]) for n, v in a["commands"].items() if _beware(v)]
+        said = [(n, v["signs"]) for n, v in a["commands"].items() if _beware(v, a)]
         what = "; ".join(f"{name}: {', '.join(signs)}" for name, signs in said)
         yield f"- {_again(a)} ({_about(a)}): {what}"
 
