@@ -283,3 +283,24 @@ def test_real_recordings_have_no_remark_at_full_rate(data_folder):
         # It turned one way, too.
         odrive = {"coarse_sampling", "one_direction"} if "odrive" in record.source else set()
         assert found <= odrive, found
+
+
+def hidden(force):
+    """What an axis over a stroke, `(800,)` rows, leaves of a force of inertia, Coulomb, viscous."""
+    time = np.arange(800) * 0.01
+    position = np.sin(1.3 * time) + 0.6 * np.sin(2.9 * time + 1)
+    velocity = np.gradient(position, time)
+    columns = np.stack([np.gradient(velocity, time), np.sign(velocity), velocity], axis=1)
+    alpha = np.array([1.0, 3.0, 0.4])
+    target = columns @ alpha + force(position, velocity)
+    alpha, *_ = np.linalg.lstsq(columns, target, rcond=None)
+    design = Design(columns, target, target - columns @ alpha, np.ones(len(time)), time)
+    return checks.hides(design, time, position, np.ones(len(time), bool), alpha, [0, 1, 2])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_repeats_with_the_place_may_hide_a_parameter_and_noise_does_not(seed):
+    draw = np.random.default_rng(seed)
+    assert hidden(lambda x, v: 0.5 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
+    assert not hidden(lambda x, v: 0.05 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
+    assert not hidden(lambda x, v: 0.6 * draw.normal(size=len(x)))

@@ -9,6 +9,7 @@ from .kinds import (
     remarks as remarks,
 )
 from .recorded import LONE as LONE, lone as lone, recorded as recorded
+from .structure import hides as hides
 
 
 def inspect(recording) -> tuple[Remark, ...]:

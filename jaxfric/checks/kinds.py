@@ -225,7 +225,7 @@ KINDS = (
     Kind(
         "structure_left",
         False,
-        "The model leaves {value:.0%} of the force, and not as noise: something is missing from "
+        "The model leaves {value:.1%} of the force, and not as noise: something is missing from "
         "it, and the parameters hold a part of that. jaxfric explain says what.",
     ),
 )

@@ -79,7 +79,9 @@ def solve(question: Question, faults: np.ndarray, over: Mesh | None = None) -> I
         batch = jax.tree.map(lambda x: _spread(x, full, over), question.recording)
         spread = _solve(question._replace(recording=batch), over)
         found, design = jax.tree.map(lambda x: _gather(x)[:count], spread)
-    return jax.tree.map(np.asarray, identification.checked(found, design, faults))
+    return jax.tree.map(
+        np.asarray, identification.checked(found, design, question.recording, faults)
+    )
 
 
 @eqx.filter_jit

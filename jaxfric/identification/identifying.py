@@ -18,7 +18,8 @@ from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
 from . import reduced, uncertainty, weighing
-from .identified import LEAST_EXPLAINED, Identified, Result, raise_unless_successful, result_names
+from .checking import checked, faults
+from .identified import LEAST_EXPLAINED, Identified, Result, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
 from .question import ask
 from .search import Found, search
@@ -69,7 +70,7 @@ def identify(
         found, design = solve(*question._replace(projection=weak))
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((found, recording))):
-        found = checked(found, design, faults(recording))
+        found = checked(found, design, recording, faults(recording))
     if throw:
         raise_unless_successful(found)
     return found
@@ -84,58 +85,6 @@ def _plain(recording: Recording) -> Recording:
 
 def _named_in(model: Model, units) -> Model:
     return dataclasses.replace(model, units=units)
-
-
-def checked(found: Identified, design: Design, faults: np.ndarray) -> Identified:
-    """What was identified with its warnings; a severe one makes a row contradictory.
-
-    `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
-    """
-    errors, warnings = np.atleast_1d(found.force_error), np.array(faults, ndmin=2)
-    for i, error in enumerate(errors):
-        own = design if faults.ndim == 1 else jax.tree.map(lambda x, i=i: x[i], design)
-        fitted = checks.fitted(own, float(error))
-        warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
-    negative = _negative(found).reshape(len(warnings))
-    column = checks.NAMES.index("negative_parameter")
-    warnings[:, column] = np.where(negative > 0, negative, np.nan)
-    severe = np.array([kind.severe for kind in checks.KINDS])
-    wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
-    warnings = warnings.reshape(faults.shape).astype(np.asarray(found.force_error).dtype)
-    return dataclasses.replace(
-        found, warnings=jnp.asarray(warnings), result=_contradicted(found.result, wrong)
-    )
-
-
-def _negative(found: Identified) -> np.ndarray:
-    """How many of inertia, Coulomb and viscous friction are negative beyond their intervals."""
-    names = found.names
-    own = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
-    own = [i for i in own if i < len(found.model.term.affine)]
-    variance = np.diagonal(np.asarray(found.covariance), axis1=-2, axis2=-1)[..., own]
-    bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
-    high = np.asarray(found.model.alpha)[..., own] + bound * np.sqrt(variance)
-    return np.sum(high < 0, axis=-1)
-
-
-# What says more than that signals contradict each other.
-_PLAINER = ("not_finite", "no_slip", "open_windows")
-
-
-def _contradicted(result: Result, wrong: np.ndarray) -> Result:
-    names = result_names()
-    plainer = np.isin(np.asarray(result._value), [names.index(name) for name in _PLAINER])
-    number = np.where(wrong & ~plainer, names.index("contradictory"), np.asarray(result._value))
-    return eqx.tree_at(lambda r: r._value, result, jnp.asarray(number, result._value.dtype))
-
-
-def faults(recording: Recording) -> np.ndarray:
-    """The faults of a recording as it was read, `(W,)`, or of a batch, `(B, W)`."""
-    host = jax.tree.map(np.asarray, recording)
-    if recording.time.ndim == 1:
-        return checks.recorded(host)
-    rows = range(len(host.time))
-    return np.stack([checks.recorded(jax.tree.map(lambda x, i=i: x[i], host)) for i in rows])
 
 
 def _too_open(found: Identified) -> bool:

@@ -86,7 +86,8 @@ def draw(rng: Generator, kind: Range) -> Pair:
         truth |= {"stribeck_force+": axis.bump, "stribeck_force-": axis.bump}
     about = truth, speed, hard, cycle, "gaussian" if axis.bump else "coulomb-viscous"
     machine = f"{kind.name}: {note}"
-    return Pair(Log(first, names, *about, machine), Log(second, names, *about, machine))
+    lacks = axis.cogging > 0
+    return Pair(*(Log(each, names, *about, machine, lacks) for each in (first, second)))
 
 
 def _placed(x: np.ndarray, low: float, stroke: float) -> np.ndarray:

@@ -41,6 +41,7 @@ class Log(NamedTuple):
     - `cycle`: samples a cycle of the fastest motion.
     - `model`: name of the model that is right for it.
     - `machine`: what it was drawn from, for the report.
+    - `lacks`: whether that model lacks a force of the machine, so that saying so is right.
     - `text`: how it is written.
     """
 
@@ -52,6 +53,7 @@ class Log(NamedTuple):
     cycle: float
     model: str
     machine: str
+    lacks: bool = False
     text: Text = Text()
 
     @property

@@ -66,6 +66,7 @@ def _described(case: Case, made: Made, verdict: Verdict, verdicts) -> dict[str, 
         "machine": made.log.machine,
         "model": made.log.model,
         "velocity": "velocity" in made.log.columns,
+        "lacks": made.log.lacks,
         "outcome": verdict.outcome,
         "commands": {name: each._asdict() for name, each in verdicts.items()},
     }

@@ -46,7 +46,8 @@ def false_warnings(answers: Iterable[Answer]) -> list[Answer]:
 
     A Stribeck velocity on its border, a column that is not excited, a refinement that did not end
     say that the recording does not determine that model: no warning of the log. That the velocity
-    is off by more than a hundredth is a fault of the log where it is.
+    is off by more than a hundredth is a fault of the log where it is, and that something is missing
+    is one of the model where the machine has more.
     """
     return [a for a in answers if a["family"] == "healthy" and _flagged(a)]
 
@@ -65,6 +66,8 @@ def _beware(verdict: Answer, answer: Answer) -> bool:
     signs = set(verdict["signs"])
     if answer.get("velocity_error", 0.0) > UNRESOLVED:
         signs -= OF_THE_DERIVATIVE
+    if answer.get("lacks"):
+        signs -= {"structure_left"}
     undetermined = verdict["outcome"] == "refused" and signs <= UNDETERMINED
     no_warning = verdict["outcome"] == "warned" and signs <= {*UNSURE, "not_better"}
     return verdict["outcome"] in ("refused", "warned") and not (undetermined or no_warning)
