@@ -301,6 +301,6 @@ def hidden(force):
 @pytest.mark.parametrize("seed", range(5))
 def test_what_repeats_with_the_place_may_hide_a_parameter_and_noise_does_not(seed):
     draw = np.random.default_rng(seed)
-    assert hidden(lambda x, v: 0.5 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
+    assert hidden(lambda x, v: 1.0 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.05 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.6 * draw.normal(size=len(x)))
