@@ -13,7 +13,7 @@ import jaxfric
 from jaxfric import cli, models
 from jaxfric.cli import commands, main
 from jaxfric.data import io
-from jaxfric.data.recording import PADDING, uniform
+from jaxfric.data.recording import LONG, PADDING, uniform
 from jaxfric.identification import documents
 
 ROOT = Path(__file__).parents[1]
@@ -161,9 +161,9 @@ def test_padding_changes_nothing(axis, projection):
 def test_padded_lengths_are_few_and_near(count):
     recording = jaxfric.Recording(np.arange(count), np.zeros(count), np.zeros(count))
     length = uniform(recording).num_samples
-    assert count <= length <= max(256, 1.25 * count)
+    assert count <= length <= max(2048, (1.25 if count > LONG else 2) * count)
     mantissa = length / 2 ** int(np.log2(length))
-    assert mantissa in PADDING
+    assert mantissa in (PADDING if count > LONG else (1.0,))
 
 
 def test_the_picture(axis, tmp_path):

@@ -1,0 +1,54 @@
+"""What Python's first call compiles, and what later ones do not."""
+
+import jax
+import numpy as np
+import pytest
+
+import jaxfric as jf
+from jaxfric.data.recording import uniform
+
+UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"))
+LENGTHS = (2500, 2600, 2900, 3000, 3333, 3500, 3700, 3999, 4000, 4096)
+
+
+def log(count: int, number: int) -> jf.Recording:
+    """A machine of its own, under a name and in units of its own."""
+    time = 1e-3 * np.arange(count)
+    position = np.sin(9 * time + 1) + 0.4 * np.sin(23 * time)
+    velocity = np.gradient(position, time)
+    force = 2 * np.gradient(velocity, time) + (5 + number) * np.sign(velocity) + 3 * velocity
+    force = force + 0.05 * np.random.default_rng(number).normal(size=count)
+    length, unit = UNITS[number % len(UNITS)]
+    units = (("position", length), ("force", unit))
+    return jf.Recording(time, force, position, source=f"axis {number}.csv", units=units)
+
+
+@pytest.fixture
+def compiled():
+    """Names of the programs that XLA compiles while the test runs."""
+    names: list[str] = []
+
+    def heard(event, seconds, **about):
+        if "backend_compile" in event:
+            names.append(about.get("fun_name", event))
+
+    jax.monitoring.register_event_duration_secs_listener(heard)
+    yield names
+    names = []  # the listener stays, and is heard no more
+
+
+def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
+    found = [jf.identify("coulomb-viscous", log(LENGTHS[0], 0))]
+    compiled.clear()
+    found += [jf.identify("coulomb-viscous", log(n, i)) for i, n in enumerate(LENGTHS) if i]
+    assert compiled == []
+    for number, fit in enumerate(found):
+        assert abs(fit.parameters["coulomb+"].value / (5 + number) - 1) < 0.02
+
+
+def test_a_session_over_recordings_of_any_length_stays_bounded():
+    lengths = {
+        uniform(jf.Recording(np.arange(n), np.zeros(n), np.zeros(n))).num_samples
+        for n in np.geomspace(2, 500_000, 500).astype(int)
+    }
+    assert len(lengths) < 20
