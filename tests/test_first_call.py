@@ -43,7 +43,8 @@ def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
     found += [jf.identify("coulomb-viscous", log(n, i)) for i, n in enumerate(LENGTHS) if i]
     assert compiled == []
     for number, fit in enumerate(found):
-        assert abs(fit.parameters["coulomb+"].value / (5 + number) - 1) < 0.02
+        coulomb = fit.parameters["coulomb+"]
+        assert abs(coulomb.value - (5 + number)) < 3 * coulomb.standard_error
 
 
 def test_a_session_over_recordings_of_any_length_stays_bounded():
