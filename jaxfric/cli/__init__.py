@@ -6,6 +6,7 @@ Nothing heavy is imported before a command runs, so that `jaxfric --help` answer
 import argparse
 import gc
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -18,7 +19,9 @@ from . import options
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status: 0 done, 2 bad input or usage."""
-    arguments = _parser().parse_args(argv)
+    given = sys.argv[1:] if argv is None else list(argv)
+    arguments = _parser().parse_args(given)
+    arguments.typed = shlex.join(["jaxfric", *given])
     name = f"jaxfric {arguments.command}"
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # what its encoding lacks is no reason to fail

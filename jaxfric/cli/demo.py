@@ -9,6 +9,7 @@ from ..identification import documents, tabulate
 from ..report import page, pictures
 from ..validation import concealed
 from . import commands
+from .explain import today
 from .options import say
 
 # One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.
@@ -40,8 +41,10 @@ def run(arguments: Namespace) -> int:
     missing = ""
     try:
         pictures.library()
+        page.library()
         commands.draw(fitted, recording, folder / "friction.png")
-        write_text(folder / "explanation.html", page.render(told, found.curves))
+        text = page.render(told, found.curves, arguments.typed, today())
+        write_text(folder / "explanation.html", text)
         written += ["friction.png", "explanation.html"]
     except ValueError as error:
         missing = f"\nNo pictures: {error}"

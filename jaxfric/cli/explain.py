@@ -1,7 +1,10 @@
 """`jaxfric explain`: what a model leaves out of a recording."""
 
 import dataclasses
+import os
+import time
 from argparse import Namespace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from ..data.recording import Recording, check_same_units
@@ -10,7 +13,7 @@ from ..explanation.baseline import baseline_of
 from ..identification import documents, tabulate
 from ..models import Model, load, named
 from ..programs import kept_in
-from ..report import charts, page
+from ..report import page
 from ..simulators import Known, Mujoco, same_motion
 from ..terms import KNOWN_FORCE
 from .commands import programs_folder, put, read
@@ -20,7 +23,7 @@ from .options import say, standard
 def run(arguments: Namespace) -> int:
     """Explain one recording; print it, and write what was asked for."""
     if arguments.report:
-        charts.library()
+        page.library()
     recording, notes = read(arguments.file, arguments)
     holdout = None
     if arguments.holdout:
@@ -53,8 +56,15 @@ def written(found: Explanation, document: dict, arguments: Namespace) -> dict[st
     if arguments.save:
         texts[arguments.save] = documents.to_json(found.model.to_dict())
     if arguments.report:
-        texts[arguments.report] = page.render(document, found.curves)
+        texts[arguments.report] = page.render(document, found.curves, arguments.typed, today())
     return texts
+
+
+def today() -> str:
+    """The date in universal time; that of SOURCE_DATE_EPOCH, where a build is to be repeated."""
+    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = int(stamp) if stamp.isdecimal() else time.time()
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d")
 
 
 def _simulation(

@@ -11,9 +11,10 @@ from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch
+from .bins import unit
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
-from .curves import curves, unit
+from .curves import curves
 from .doubts import NOT_BETTER, accelerates, doubts, not_better
 from .errors import document, filtered_errors
 from .evidence import Evidence
@@ -22,6 +23,7 @@ from .figures import Figures
 from .improvement import Improved, elsewhere
 from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
+from .partial_residuals import moved as moved_curve, partial_residuals
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fast, fit
@@ -49,6 +51,7 @@ def tell(
     first, found, rest = better.first, better.found, better.rest
     before, after = _places(asked, better, wrong, seed)
     findings = _findings(found, asked, rest, first)
+    shown = partial_residuals(asked, better)
     standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
     for finding in findings:
@@ -56,10 +59,13 @@ def tell(
     values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
+        shown = [moved_curve(asked, better, wrong), *shown]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
     drawn = curves(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
+    told = sorted(zip(findings, shown, strict=True), key=lambda pair: -pair[0].share)
+    findings, drawn["findings"] = [each for each, _ in told], [picture for _, picture in told]
     filtered = filtered_errors(asked, first, *rest)
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(asked, better, units)]
@@ -69,7 +75,7 @@ def tell(
     return Explanation(
         verdict=_doubted(verdict, remarks),
         where=_everywhere([_where(place, units) for place in before], findings, first),
-        findings=sorted(findings, key=lambda finding: -finding.share),
+        findings=findings,
         fit=errors,
         not_visible=_not_visible(found, units, better.gone),
         model=models[1],
@@ -301,7 +307,7 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
                 taken.p_value,
             )
         )
-    return sorted(findings, key=lambda finding: -finding.share)
+    return findings
 
 
 def _shares(
