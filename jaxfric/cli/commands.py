@@ -124,7 +124,7 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
     if arguments.save:
-        put(arguments.save, documents.to_json(found.model.to_dict()))
+        put(arguments.save, documents.to_json(documents.saved(found.model, recording)))
     if arguments.plot:
         draw(found, recording, arguments.plot)
     return document

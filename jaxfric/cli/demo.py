@@ -36,7 +36,9 @@ def run(arguments: Namespace) -> int:
     say(f"\nConcealed was: {_truth(machine)}")
     write_text(folder / "identification.json", documents.to_json(document))
     write_text(folder / "explanation.json", documents.to_json(told))
-    write_text(folder / "model.json", documents.to_json(found.model.to_dict()))
+    write_text(
+        folder / "model.json", documents.to_json(documents.saved(found.model, recording, holdout))
+    )
     written = ["axis.csv", "holdout.csv", "identification.json", "explanation.json", "model.json"]
     missing = ""
     try:

@@ -7,6 +7,7 @@ from argparse import Namespace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
 from ..explanation import Explanation, explain
 from ..explanation.baseline import baseline_of
@@ -39,7 +40,10 @@ def run(arguments: Namespace) -> int:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()
     document["recording"]["notes"] = notes
-    texts = written(found, document, arguments)
+    for path in (arguments.baseline, arguments.simulation, arguments.mujoco):
+        if path and (digest := sha256(path)):
+            document["baseline"] |= {"file": path, "sha256": digest}
+    texts = written(found, document, arguments, (recording, holdout))
     # First what lasts: who reads the table may close the pipe.
     for path, text in texts.items():
         put(path, text)
@@ -48,13 +52,15 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def written(found: Explanation, document: dict, arguments: Namespace) -> dict[str, str]:
+def written(
+    found: Explanation, document: dict, arguments: Namespace, recordings: tuple
+) -> dict[str, str]:
     """The JSON, the model and the page by the path that was given for each, all of them ready."""
     texts = {}
     if arguments.json:
         texts[arguments.json] = documents.to_json(document)
     if arguments.save:
-        texts[arguments.save] = documents.to_json(found.model.to_dict())
+        texts[arguments.save] = documents.to_json(documents.saved(found.model, *recordings))
     if arguments.report:
         texts[arguments.report] = page.render(document, found.curves, arguments.typed, today())
     return texts

@@ -12,6 +12,7 @@ from . import columns as names, stamps
 from .cleaning import clean
 from .delimited import Table, numbers
 from .printable import encodable
+from .provenance import sha256
 from .recording import Recording
 from .tables import load
 from .writing import (
@@ -116,6 +117,7 @@ def read_with_notes(
         channels={role: scaled[role] for role in scaled if role not in _SIGNALS},
         units=tuple(names.units(chosen, scale, units).items()),
         source=source,
+        sha256=sha256(path),
     )
     return recording, notes
 

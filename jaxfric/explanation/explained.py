@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..data.provenance import versions
 from ..identification import tabulate
 from ..identification.uncertainty import Estimate
 from ..looks import drawing, html, text
@@ -73,6 +74,7 @@ class Explanation:
     - `not_visible`: the smallest size of each other effect that this recording would have shown.
     - `model`: baseline and found terms, for predict, simulate and export.
     - `baseline`: the baseline with its parameters; `baseline_parameters` with standard errors.
+    - `recording`, `holdout`: file and its SHA-256, samples, duration and rate of each.
     - `curves`: what pictures are drawn from.
     - `warnings`: what makes the answer doubtful, each with `name`, `text` and whether it is
       `severe`: then what would be said beside it is certain to be wrong.
@@ -94,6 +96,7 @@ class Explanation:
     baseline_name: str
     baseline_parameters: dict[str, Estimate]
     recording: dict[str, Any]
+    holdout: dict[str, Any] | None = None
     curves: dict[str, Any] = dataclasses.field(default_factory=dict, repr=False)
     warnings: list[dict[str, Any]] = dataclasses.field(default_factory=list)
     holdout_model: Model | None = None
@@ -122,6 +125,8 @@ class Explanation:
             ],
             "fit": self.fit,
             "not_visible": self.not_visible,
+            "holdout": self.holdout,
+            "versions": versions(),
         }
 
     def __repr__(self) -> str:

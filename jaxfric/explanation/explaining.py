@@ -29,7 +29,7 @@ from .naming import LATER_SHARE, LEAST_OF_BASE, LINEARITY, MOST, OF_BASE, Named,
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
-from .telling import tell
+from .telling import facts, tell
 from .timing import LATE, late, overlooked, settled
 from .views import weightless
 
@@ -90,7 +90,8 @@ def explain(
     values = dict(told.baseline_parameters)
     for name in unseen(values, recording):
         values[name] = values[name]._replace(value=np.float64(np.nan))
-    return dataclasses.replace(told, **models, baseline_parameters=values)
+    held_out = None if holdout is None else facts(holdout)
+    return dataclasses.replace(told, **models, baseline_parameters=values, holdout=held_out)
 
 
 def _as_seen(model: Model, recording: Recording) -> Model:

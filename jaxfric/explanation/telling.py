@@ -82,7 +82,7 @@ def tell(
         baseline=models[0],
         baseline_name=known.name,
         baseline_parameters=values,
-        recording=_facts(recording),
+        recording=facts(recording),
         curves=drawn,
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if asked.held is None else elsewhere(found, rest, recording.units),
@@ -394,12 +394,14 @@ def _not_visible(found: Named, units, gone: Sequence[str]) -> list[dict[str, Any
     ]
 
 
-def _facts(recording: Recording) -> dict[str, Any]:
+def facts(recording: Recording) -> dict[str, Any]:
+    """File, samples, duration, s, and rate, Hz, of a recording."""
     time, mask = np.asarray(recording.time), np.asarray(recording.mask)
     steps = np.diff(time[mask])
     steps = steps[steps > 0]
     return {
         "file": recording.source,
+        "sha256": recording.sha256 or None,
         "samples": int(mask.sum()),
         "duration": float(steps.sum()),
         "sample_rate": float(1 / np.median(steps)),
