@@ -267,7 +267,10 @@ def _add_export(commands) -> None:
     command = _add(commands, "export", "export.run", "hand a model over to another program")
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument(
-        "--to", required=True, choices=("c", "modelica", "mujoco", "urdf", "table"), help="target"
+        "--to",
+        required=True,
+        choices=("c", "st", "modelica", "mujoco", "urdf", "table"),
+        help="target",
     )
     command.add_argument(
         "-o", "--out", type=options.output, default="-", metavar="OUT", help="default: printed"

@@ -5,7 +5,7 @@ from typing import Any
 from ..export import export
 from ..models import Model
 
-TITLES = {"c": "C99", "mujoco": "MuJoCo (MJCF)"}
+TITLES = {"st": "IEC 61131-3 Structured Text", "c": "C99", "mujoco": "MuJoCo (MJCF)"}
 
 
 def code(model: Model) -> list[dict[str, Any]]:
