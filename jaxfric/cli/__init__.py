@@ -186,9 +186,10 @@ def _add_explain(commands) -> None:
     base = command.add_mutually_exclusive_group()
     base.add_argument(
         "--baseline",
-        metavar="NAME_OR_MODEL.json",
-        help="a name that jaxfric models lists, or a saved model (default: gaussian; with "
-        "--columns known_force=NAME your simulator's force, as it is)",
+        metavar="NAME_OR_FILE",
+        help="a name that jaxfric models lists; a saved model, MODEL.json; or an earlier recording "
+        "of this machine: what changed (default: gaussian; with --columns known_force=NAME your "
+        "simulator's force, as it is)",
     )
     base.add_argument(
         "--simulation",

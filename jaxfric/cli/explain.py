@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
-from ..explanation import Explanation, explain
+from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
 from ..identification import documents, tabulate
 from ..models import Model, load, named
@@ -112,7 +112,7 @@ def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Reco
 
 def _baseline(
     arguments: Namespace, recording: Recording, holdout: Recording | None
-) -> str | Model | Recording | Known | Mujoco:
+) -> str | Model | Recording | Earlier | Known | Mujoco:
     if arguments.joint and not arguments.mujoco:
         raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
     if arguments.mujoco:
@@ -126,10 +126,13 @@ def _baseline(
     text = arguments.baseline
     if not text.endswith(".json"):
         if Path(text).is_file():
-            raise ValueError(
-                f"--baseline {text}: a model is a .json file; another simulator's output goes to "
-                "--simulation."
-            )
+            other = _beside(text, recording, arguments)[0]
+            if other.sha256 == recording.sha256:
+                raise ValueError(
+                    f"--baseline {text}: this is {arguments.file} itself. Give an earlier "
+                    "recording of the machine."
+                )
+            return Earlier(other)
         named(text)
         return text
     try:

@@ -17,10 +17,11 @@ from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, threads, verification
-from .baseline import Baseline, as_given, at_values, baseline_of, mismatch, simulated
+from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
 from .candidates import OF_THE_MOMENT
 from .contest import Contest, contest
 from .doubts import contradicted
+from .earlier import Earlier, changed, obeyed, rephased
 from .explained import Explanation
 from .figures import Figures, cast
 from .forward import motion_error
@@ -36,7 +37,7 @@ from .views import weightless
 
 def explain(
     recording: Recording,
-    baseline: str | AbstractTerm | Model | Identified | Recording = "gaussian",
+    baseline: str | AbstractTerm | Model | Identified | Recording | Earlier = "gaussian",
     holdout: Recording | None = None,
     *,
     fixed: bool = False,
@@ -53,7 +54,7 @@ def explain(
       simulator's force along the recorded motion (`jf.simulators.Known`, any function from a
       recording to it, `(N,)`, or a recording of the same motion), which stands as it is; or a
       recording of the same reference run through another simulator, which a sum of terms is
-      fitted to.
+      fitted to; or an earlier recording of the machine, `Earlier(recording)`: what has changed.
     - `fixed`: values that are not found wrong stay as given, instead of being refitted.
     - `simulate`: run both models forward, from the recorded motion and by the recorded force, piece
       by piece, and compare the velocities (`fit["simulation_error"]`); takes some seconds more.
@@ -67,12 +68,15 @@ def explain(
     if holdout is not None:
         require(holdout, "explain (holdout)")
         require_force(holdout, "explain (holdout)")
-    if isinstance(baseline, Recording):
-        require(baseline, "explain (baseline)")
-    for other in (holdout, baseline):
+    known = baseline.recording if isinstance(baseline, Earlier) else baseline
+    if isinstance(known, Recording):
+        require(known, "explain (baseline)")
+    for other in (holdout, known):
         if isinstance(other, Recording):
             check_same_units(recording, other)
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
+    if isinstance(baseline, Earlier):
+        baseline = baseline.recording
     if not isinstance(baseline, Recording):
         baseline_of(baseline)
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
@@ -169,6 +173,8 @@ def _explain(
 ) -> Explanation:
     known = _known(baseline, seed)
     asked = ask(recording, holdout, known.structure)
+    if known.fit is not None:
+        known = rephased(known, asked.evidence)
     remarks = [*remarks, *_contradictions(asked)]
     wrong = None
     if any(remark.severe for remark in remarks):
@@ -179,6 +185,10 @@ def _explain(
         there, left = rest
         if known.model is not None:
             wrong = mismatch(known.model, left.last, there.evidence, seed)
+        if wrong is not None and known.errors is not None:
+            here = spelled.estimates(left.last, there.block, recording.unit_names)[0]
+            names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
+            wrong = changed(wrong, known, left.last, [float(here[n].standard_error) for n in names])
         if known.model is not None and (wrong is not None or fixed):
             free = () if wrong is None else tuple(wrong.moved)
             found = _as_given(known.model, found, asked, free)
@@ -244,8 +254,7 @@ def _with_the_force_put_back(
 
 def _known(baseline, seed: int) -> Baseline:
     if isinstance(baseline, Recording):
-        _, found = pursue(baseline, None, named("gaussian"), seed)
-        return simulated(baseline, found)
+        return obeyed(baseline, *pursue(baseline, None, named("gaussian"), seed), seed)
     return baseline_of(baseline)
 
 

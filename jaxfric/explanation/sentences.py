@@ -109,6 +109,41 @@ def mismatch_sentence(moved, share: float) -> str:
     return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
 
 
+_SPOKEN = {
+    "coulomb": "Coulomb friction",
+    "viscous": "viscous friction",
+    "stribeck_force": "the Stribeck bump",
+    "stribeck_velocity": "the Stribeck velocity",
+    "offset": "the constant force",
+}
+_SIDES = {"+": " forwards", "-": " backwards", "": ""}
+
+
+def parameter(name: str) -> str:
+    """A parameter in words: "Coulomb friction forwards"."""
+    side = name[-1] if name.endswith(("+", "-")) else ""
+    stem = name.removesuffix(side)
+    return _SPOKEN.get(stem, stem.replace("_", " ")) + _SIDES[side]
+
+
+def changed_sentence(moved, share: float, other: str) -> str:
+    """Values that another recording had otherwise, as a sentence; ± of the change, 95 %."""
+    parts = []
+    for name, m in moved.items():
+        error = math.hypot(float(m.standard_error), m.before_error)
+        half = 2 * error
+        digits = max(0, 1 - math.floor(math.log10(half))) if 0 < half < math.inf else 3
+        unit = f" {m.unit}" if m.unit not in ("", "1") else ""
+        way = "rose" if m.value > m.before else "fell"
+        part = f"{parameter(name)} {way} from {m.before:.{digits}f} to {m.value:.{digits}f}{unit}"
+        if 0 < half < math.inf:
+            part += f" (± {half:.{digits}f})"
+        parts.append(part)
+    text = ", ".join(parts)
+    text = text[:1].upper() + text[1:]
+    return f"{text} since {other or 'the other recording'}; {share:.0%} of the difference."
+
+
 class _Gaps(dict):
     def __missing__(self, key):
         return "an unknown amount"

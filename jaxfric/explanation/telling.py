@@ -27,7 +27,7 @@ from .partial_residuals import moved as moved_curve, partial_residuals
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fast, fit
-from .sentences import mismatch_sentence, sentence
+from .sentences import changed_sentence, mismatch_sentence, sentence
 from .views import estimated
 
 
@@ -58,7 +58,7 @@ def tell(
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
     values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
     if wrong is not None:
-        findings = [_moved(values, wrong, found, first, asked), *findings]
+        findings = [_moved(values, wrong, known, found, first, asked), *findings]
         shown = [moved_curve(asked, better, wrong), *shown]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
     drawn = curves(
@@ -69,12 +69,14 @@ def tell(
     filtered = filtered_errors(asked, first, *rest)
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(asked, better, units)]
-    verdict = _verdict(findings, before, after, _rough(filtered, shares), standing)
+    much = rough(filtered, shares) and not known.rough
+    new, later = ([p for p in some if p.coordinate not in known.left] for some in (before, after))
+    verdict = _verdict(findings, new, later, much, standing)
     errors = document(asked, better, filtered, models[1], figures)
     remarks = [*remarks, *_elsewhere(errors)]
     return Explanation(
-        verdict=_doubted(verdict, remarks),
-        where=_everywhere([_where(place, units) for place in before], findings, first),
+        verdict=_doubted(verdict, remarks, known.fit is not None),
+        where=_everywhere([_where(place, units, known) for place in before], findings, first),
         findings=findings,
         fit=errors,
         not_visible=_not_visible(found, units, better.gone),
@@ -93,14 +95,16 @@ def _places(asked: Question, better: Improved, wrong: Mismatch | None, seed: int
     """Where the baseline's residual has structure, and where that of the findings has."""
     first, evidence = better.first, asked.evidence
     force = float(np.sqrt(np.mean(evidence.force**2)))
-    before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
+    before = shown_places(
+        locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force
+    )
     before = _through_wide(before, first, asked.wide, seed)
     before = _lasting(before, first, asked)
     if not better.found.taken and wrong is None:
         return before, []
     where, left = better.rest
     seen = with_predictions(where.evidence, left.last)
-    after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
+    after = shown_places(locate(seen, left.last, seed), LATER_SHARE, force)
     after = _through_wide(after, left.last, where.wide, seed)
     return before, _lasting(after, left.last, where)
 
@@ -136,14 +140,19 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
     return [Remark("holdout_differs", text, False)]
 
 
-def _doubted(verdict: str, remarks: Sequence[Remark]) -> str:
-    """A verdict that says no more than the remarks allow."""
+def _doubted(verdict: str, remarks: Sequence[Remark], compared: bool) -> str:
+    """A verdict that says no more than the remarks allow.
+
+    `compared`: with another recording, in which what has no name may be as well.
+    """
     names = {remark.name for remark in remarks}
     doubtful = any(remark.severe for remark in remarks)
     if verdict == "explained" and doubtful:
         return "partly_explained"
     return (
-        "unexplained" if verdict == "consistent" and (doubtful or NOT_BETTER in names) else verdict
+        "unexplained"
+        if verdict == "consistent" and (doubtful or (NOT_BETTER in names and not compared))
+        else verdict
     )
 
 
@@ -158,23 +167,31 @@ def _freed(now: Fit, wrong: Mismatch | None) -> Fit:
     return now._replace(columns=columns, slopes=slopes)
 
 
-def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -> Finding:
+def _moved(
+    values, wrong: Mismatch, known: Baseline, found: Named, first: Fit, asked: Question
+) -> Finding:
     names = [p.name for p in (*found.base.terms[0].affine, *found.base.terms[0].nonlinear)]
-    moved = {
-        names[i]: Moved(before, values[names[i]].value, *values[names[i]][1:3])
-        for i, before in wrong.moved.items()
-    }
+    errors = np.zeros(len(names)) if known.errors is None else known.errors
+    moved = {}
+    for i, before in wrong.moved.items():
+        now = values[names[i]]
+        if i not in wrong.within:
+            moved[names[i]] = Moved(
+                before, now.value, now.standard_error, now.unit, float(errors[i])
+            )
     held = None
     if asked.held is not None:
         held = verification.share(first, found.base, first, asked.held)
     text = mismatch_sentence(moved, wrong.share)
+    if known.fit is not None:
+        text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
     equation = "θ = θ₀ + Δθ"
     return Finding(
         "parameter_mismatch", equation, text, (), "", moved, wrong.share, held, wrong.p_value
     )
 
 
-def _shown(places: list[Place], least: float, force: float) -> list[Place]:
+def shown_places(places: list[Place], least: float, force: float) -> list[Place]:
     """The places that are believed: by chance, by share, and beyond the force's linearity."""
     floor = LINEARITY * force
     return [p for p in places if p.p_value <= LEVEL and p.share >= least and p.size >= floor]
@@ -223,7 +240,7 @@ ROUGH = 4.0
 HALF_ROUGH, HALF = 1.25, 0.5
 
 
-def _rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
+def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or much of it all.
 
     What is named (`shares` by effect) has to explain the held-out recording as well. What belongs
@@ -363,7 +380,7 @@ def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list
     return places
 
 
-def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
+def _where(place: Place, units: Mapping[str, str], known: Baseline) -> dict[str, Any]:
     detail, its = "", unit(place.coordinate, units)
     if place.coordinate == "position_lines":
         detail = f"period {1 / place.peak:.4g} {its}"
@@ -376,6 +393,8 @@ def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
         at, height = place.curve
         peak = int(np.argmax(np.abs(height)))
         detail = f"strongest at {at[peak]:.3g} {its}".rstrip()
+    if place.coordinate in known.left:
+        detail += ", as in the other recording"
     return {
         "coordinate": place.coordinate.removesuffix("_lines"),
         "share": place.share,

@@ -5,6 +5,7 @@ from typing import Any
 
 from ..terms.effects import EFFECTS
 
+MISMATCH = "parameter_mismatch"
 # More steps than this are no advice.
 MOST = 4
 # A share of the force beyond what noise makes that is worth another look.
@@ -22,9 +23,15 @@ def headline(document: Mapping[str, Any]) -> str:
     if severe and not document.get("findings"):
         return severe[0]
     errors = _errors(document.get("fit") or {})
-    names = [spoken(f["effect"]) for f in document.get("findings") or ()]
+    findings = document.get("findings") or ()
+    names = [spoken(f["effect"]) for f in findings if f["effect"] != MISMATCH]
+    wrong = [f["sentence"].rpartition(";")[0] for f in findings if f["effect"] == MISMATCH]
     where = [spoken(p["coordinate"]) for p in document.get("where") or ()]
     shown = _listed(names)
+    if wrong and document["verdict"] in ("explained", "partly_explained"):
+        beside = f"; the model also leaves out {shown}" if names else ""
+        left = "; more is left" if document["verdict"] == "partly_explained" else ""
+        return f"{wrong[0]}{beside}{left}{errors}."
     return {
         "consistent": f"Nothing is missing beyond the noise{errors}.",
         "explained": f"The model leaves out {shown}, which accounts for the mismatch{errors}.",
