@@ -6,6 +6,7 @@ Nothing heavy is imported before a command runs, so that `jaxfric --help` answer
 import argparse
 import gc
 import os
+import re
 import shlex
 import sys
 import warnings
@@ -15,6 +16,7 @@ from io import TextIOWrapper
 from pathlib import Path
 
 from . import options
+from .examples import EXAMPLES
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -85,7 +87,21 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one line, as every other message of the command."""
 
     def error(self, message: str):
-        self.exit(2, f"{self.prog}: {options.printable(message)} (see {self.prog} --help)\n")
+        said = f"{self.prog}: {options.printable(message)}.{self._meant(message)}"
+        self.exit(2, f"{said} (see {self.prog} --help)\n")
+
+    def _meant(self, message: str) -> str:
+        """What the user may have meant by an option or a choice that there is not."""
+        if choice := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            return options.meant(choice[1], re.findall(r"[\w.-]+", choice[2]))
+        if unknown := re.search(r"unrecognized arguments: (?:.* )?(--[\w-]+)", message):
+            known = [*self._option_string_actions]
+            for action in self._actions:
+                if isinstance(action, argparse._SubParsersAction) and action.choices:
+                    for command in action.choices.values():
+                        known += command._option_string_actions
+            return options.meant(unknown[1], known)
+        return ""
 
 
 class _Version(argparse.Action):
@@ -141,7 +157,14 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add(commands, name: str, run: str, text: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+    command = commands.add_parser(
+        name,
+        help=text,
+        description=text,
+        allow_abbrev=False,
+        epilog=EXAMPLES[name],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     command.set_defaults(run=_lazily(run))
     return command
 

@@ -34,6 +34,7 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
         units=arguments.units,
         period=arguments.period,
         repair=arguments.repair,
+        rate=arguments.rate,
         **more,
     )
 
