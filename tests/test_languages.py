@@ -1,5 +1,6 @@
 """Logs in German, French, Chinese and Japanese; logs without a clock; what somebody meant."""
 
+import io
 import subprocess
 import sys
 
@@ -8,6 +9,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.cli import main
+from jaxfric.cli.commands import working
 from jaxfric.cli.examples import EXAMPLES
 from jaxfric.data.columns import describe
 from jaxfric.data.io import read_with_notes
@@ -153,3 +155,24 @@ def test_the_types_are_declared():
     code = "import importlib.resources as r; print((r.files('jaxfric') / 'py.typed').is_file())"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "True"
+
+
+# ---- progress ----
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_progress_goes_to_a_terminal_only(there, monkeypatch):
+    """With rich and without; nothing from outside steers the terminal."""
+    if not there:
+        monkeypatch.setitem(sys.modules, "rich.console", None)
+    for stream, wanted in ((Terminal(), True), (io.StringIO(), False)):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with working("explaining \x1b[31mevil[bold].csv") as doing:
+            doing("fitting the baseline")
+        assert ("explaining" in stream.getvalue()) == wanted
+        assert "\x1b[31m" not in stream.getvalue()

@@ -17,7 +17,7 @@ from ..programs import kept_in
 from ..report import page
 from ..simulators import Known, Mujoco, same_motion
 from ..terms import KNOWN_FORCE
-from .commands import programs_folder, put, read
+from .commands import programs_folder, put, read, working
 from .options import say, standard
 
 
@@ -32,9 +32,14 @@ def run(arguments: Namespace) -> int:
         notes = notes + [f"Held out: {note}" for note in more]
     baseline = _baseline(arguments, recording, holdout)
     try:
-        with kept_in(programs_folder()):
+        with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
             found = explain(
-                recording, baseline, holdout, fixed=arguments.fixed, simulate=arguments.simulate
+                recording,
+                baseline,
+                holdout,
+                fixed=arguments.fixed,
+                simulate=arguments.simulate,
+                doing=doing,
             )
     except ValueError as error:
         raise ValueError(f"{arguments.file}: {error}") from error

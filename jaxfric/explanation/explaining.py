@@ -1,7 +1,7 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
 import dataclasses
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 
 import jax
 import jax.numpy as jnp
@@ -43,6 +43,7 @@ def explain(
     fixed: bool = False,
     simulate: bool = False,
     seed: int = 0,
+    doing: Callable[[str], None] = lambda stage: None,
 ) -> Explanation:
     """What a model leaves out of a recording: where, what, how much, and what could not be seen.
 
@@ -58,7 +59,7 @@ def explain(
     - `fixed`: values that are not found wrong stay as given, instead of being refitted.
     - `simulate`: run both models forward, from the recorded motion and by the recorded force, piece
       by piece, and compare the velocities (`fit["simulation_error"]`); takes some seconds more.
-    - `seed`: of the bootstrap.
+    - `seed`: of the bootstrap; `doing`, called with what is being done, in words.
 
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
     chance.
@@ -85,7 +86,9 @@ def explain(
     # A few thousand rows: single precision would save nothing.
     with jax.enable_x64(True), threads.single():
         held, remarks = None if theirs is None else cast(theirs), [*remarks, *more]
-        told = _explain(cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed)
+        told = _explain(
+            cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed, doing
+        )
     models = {
         name: None if model is None else _as_seen(figures.own(model), recording)
         for name in ("model", "baseline", "holdout_model")
@@ -169,8 +172,17 @@ def _spikes(recording: Recording, lone: np.ndarray) -> Remark:
 
 
 def _explain(
-    recording, baseline, holdout, figures: Figures, remarks, fixed: bool, simulate: bool, seed: int
+    recording,
+    baseline,
+    holdout,
+    figures: Figures,
+    remarks,
+    fixed: bool,
+    simulate: bool,
+    seed: int,
+    doing: Callable[[str], None],
 ) -> Explanation:
+    doing("fitting the baseline")
     known = _known(baseline, seed)
     asked = ask(recording, holdout, known.structure)
     if known.fit is not None:
@@ -181,7 +193,9 @@ def _explain(
         found = _nothing(asked)
         rest = asked, found
     else:
+        doing("looking for what is missing, and whether it holds")
         asked, found, rest = _found(recording, holdout, known, asked, seed)
+        doing("judging the values")
         there, left = rest
         if known.model is not None:
             wrong = mismatch(known.model, left.last, there.evidence, seed)
@@ -194,10 +208,13 @@ def _explain(
             found = _as_given(known.model, found, asked, free)
             rest = there, _as_given(known.model, left, there, free)
     first = found.base if wrong is None else at_values(known.model, asked.evidence)
+    doing("predicting with the improved model")
     better = improved(first, found, rest, asked, figures)
+    doing("locating what is left")
     wrong = wrong if better.refitted else None
     explanation = tell(recording, asked, better, known, wrong, figures, remarks, seed)
     if simulate:
+        doing("running both models forward")
         models = {"before": explanation.baseline, "after": explanation.model}
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors

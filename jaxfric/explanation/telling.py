@@ -76,7 +76,7 @@ def tell(
     remarks = [*remarks, *_elsewhere(errors)]
     return Explanation(
         verdict=_doubted(verdict, remarks, known.fit is not None),
-        where=_everywhere([_where(place, units, known) for place in before], findings, first),
+        where=_everywhere([_where(place, units, known.left) for place in before], findings, first),
         findings=findings,
         fit=errors,
         not_visible=_not_visible(found, units, better.gone),
@@ -303,7 +303,8 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
             parameters = _dated(parameters, asked.evidence)
         share, held = _shares(found, asked, rest, first, number)
         rivals = taken.rivals
-        text = sentence(effect.name, parameters, share, rivals)
+        told = parameters | _reach(parameters, asked.evidence)
+        text = sentence(effect.name, told, share, rivals, _stroke(asked.evidence))
         if taken.rephased:
             text += (
                 " On the held-out recording it has the same period and amplitude at another "
@@ -325,6 +326,27 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
             )
         )
     return findings
+
+
+def _stroke(evidence: Evidence) -> float:
+    """The range of the position."""
+    limits = evidence.limits
+    return float(limits.high - limits.low)
+
+
+def _reach(parameters: Mapping[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
+    """How far the axis goes into a stop, where there is one, and its force there in parts of all."""
+    limits, found = evidence.limits, {}
+    for name, estimate in parameters.items():
+        if name.endswith("stop_position"):
+            lower = name.startswith("lower")
+            end = limits.low if lower else limits.high
+            far = abs(float(end) - float(estimate.value))
+            found["stop_reach"] = Estimate(np.float64(far), np.float64(0.0), estimate.unit)
+            stiffness = parameters[name.replace("position", "stiffness")].value
+            part = far * abs(float(stiffness)) / np.sqrt(np.mean(evidence.force**2))
+            found["stop_part"] = Estimate(np.float64(part), np.float64(0.0), "1")
+    return found
 
 
 def _shares(
@@ -380,7 +402,9 @@ def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list
     return places
 
 
-def _where(place: Place, units: Mapping[str, str], known: Baseline) -> dict[str, Any]:
+def _where(
+    place: Place, units: Mapping[str, str], shared: frozenset[str] = frozenset()
+) -> dict[str, Any]:
     detail, its = "", unit(place.coordinate, units)
     if place.coordinate == "position_lines":
         detail = f"period {1 / place.peak:.4g} {its}"
@@ -393,7 +417,7 @@ def _where(place: Place, units: Mapping[str, str], known: Baseline) -> dict[str,
         at, height = place.curve
         peak = int(np.argmax(np.abs(height)))
         detail = f"strongest at {at[peak]:.3g} {its}".rstrip()
-    if place.coordinate in known.left:
+    if place.coordinate in shared:
         detail += ", as in the other recording"
     return {
         "coordinate": place.coordinate.removesuffix("_lines"),
