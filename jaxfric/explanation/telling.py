@@ -335,7 +335,7 @@ def _stroke(evidence: Evidence) -> float:
 
 
 def _reach(parameters: Mapping[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
-    """How far the axis goes into a stop, where there is one, and its force there in parts of all."""
+    """How far the axis goes into a stop, and its force there in parts of the usual force."""
     limits, found = evidence.limits, {}
     for name, estimate in parameters.items():
         if name.endswith("stop_position"):
