@@ -346,3 +346,19 @@ def test_names_are_text_and_not_html():
 def test_another_document_is_refused():
     with pytest.raises(ValueError, match="Not an explanation"):
         page.render({"schema": "jaxfric.identification/1"})
+
+
+def test_where_nothing_was_found_there_is_no_improved_model_to_draw():
+    text = page.render(DOCUMENT | {"findings": [], "verdict": "consistent"}, curves())
+    labels = {series["label"] for chart in drawn(text) for series in chart["series"]}
+    assert "baseline" in labels and not any("improved" in label for label in labels)
+
+
+def test_two_recordings_are_compared_in_words_of_change():
+    base = {"name": "recording old.csv", "parameters": {}}
+    document = DOCUMENT | {"baseline": base, "findings": [], "verdict": "consistent"}
+    assert "Nothing differs between the two recordings" in advice.headline(document)
+    assert "compare the next one" in advice.steps(document)[0]
+    moved = FINDINGS[1] | {"sentence": "Coulomb friction rose from 2 to 3 N (± 0.1) since a; 9% x."}
+    document = document | {"findings": [moved], "verdict": "explained"}
+    assert advice.headline(document).startswith("Coulomb friction rose from 2 to 3 N (± 0.1) since")

@@ -5,9 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..identification.uncertainty import Estimate
 from .evidence import Evidence
 from .locate import coordinates
 from .predictions import rate
+from .quantities import quantity
 
 BINS = 48
 _UNITS = {
@@ -56,7 +58,7 @@ def axis(name: str, seen: Evidence, units: Mapping[str, str], period: float | No
     label = stem.replace("_", " ")
     if period is not None:
         value = np.mod(value, period)
-        label = f"{label.partition(' by ')[0]}, folded at {period:.4g} {its}"
+        label = f"{label.partition(' by ')[0]}, folded at {quantity(Estimate(period, 0.0, its))}"
     return Axis(label, its, value, factor)
 
 

@@ -32,6 +32,12 @@ def headline(document: Mapping[str, Any]) -> str:
         beside = f"; the model also leaves out {shown}" if names else ""
         left = "; more is left" if document["verdict"] == "partly_explained" else ""
         return f"{wrong[0]}{beside}{left}{errors}."
+    if _compared(document):
+        return {
+            "consistent": f"Nothing differs between the two recordings beyond the noise{errors}.",
+            "unexplained": "The two recordings differ by something that no effect of the library "
+            f"accounts for{errors}.",
+        }.get(document["verdict"], f"Since the other recording {shown} has come{errors}.")
     return {
         "consistent": f"Nothing is missing beyond the noise{errors}.",
         "explained": f"The model leaves out {shown}, which accounts for the mismatch{errors}.",
@@ -41,6 +47,11 @@ def headline(document: Mapping[str, Any]) -> str:
         + (f", most of it over {where[0]}" if where else "")
         + f"{errors}.",
     }.get(document["verdict"], f"{spoken(document['verdict'])}{errors}.")
+
+
+def _compared(document: Mapping[str, Any]) -> bool:
+    """Whether the baseline is another recording."""
+    return ((document.get("baseline") or {}).get("name") or "").startswith("recording")
 
 
 def _errors(fit: Mapping[str, Any]) -> str:
@@ -72,6 +83,8 @@ def steps(document: Mapping[str, Any]) -> list[str]:
         ]
     found = []
     fit = document.get("fit") or {}
+    if _compared(document) and not findings:
+        return ["Keep this recording, and compare the next one with it (--baseline)."]
     if not fit.get("holdout_force_error"):
         found.append(
             "Record a second run with the same motion and give it as --holdout: it shows whether "

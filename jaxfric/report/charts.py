@@ -90,7 +90,7 @@ def mismatch(entry: Curves, force: str, added: bool = True) -> Chart:
         [
             line("left", "what the findings add", gained, 2.2),
             points("before", "measured − baseline, ± 95 %", before, error),
-            points("after", "measured − improved model", after),
+            points("after", "measured − improved model", after) if after else None,
         ],
         320,
     )

@@ -107,6 +107,8 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
 
 def _pictures(document, curves, units: Mapping[str, str]) -> dict[str, Any]:
     """The pictures that there are curves for, each once."""
+    if not document.get("findings"):  # the improved model is the baseline
+        curves = _unchanged(curves)
     force, position = units["force"], units["position"]
     own, places = list(curves.get("findings") or ()), list(curves.get("map") or ())
     time, held = curves.get("time"), curves.get("holdout")
@@ -132,6 +134,21 @@ def _pictures(document, curves, units: Mapping[str, str]) -> dict[str, Any]:
         "holdout": charts.in_time(held, force)[1] if held else None,
         "friction": friction,
         "one_sided": min(velocity) > 0 or max(velocity) < 0,
+    }
+
+
+def _unchanged(curves: Mapping[str, Any]) -> dict[str, Any]:
+    """The curves without those of an improved model."""
+
+    def alone(entry):
+        return entry and {**entry, "after": None}
+
+    shown = {name: alone(curves.get(name)) for name in ("time", "holdout", "friction")}
+    return {
+        **curves,
+        **shown,
+        "findings": None,
+        "map": [alone(each) for each in curves.get("map") or ()],
     }
 
 
