@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     )
     from .data.io import read as read
     from .data.recording import Recording as Recording, pad as pad, stack as stack
-    from .explanation import Explanation as Explanation, explain as explain
+    from .explanation import (
+        Earlier as Earlier,
+        Explanation as Explanation,
+        explain as explain,
+    )
     from .identification import devices as devices
     from .identification.identified import Identified as Identified, Result as Result
     from .identification.identifying import identify as identify
@@ -45,7 +49,7 @@ _MODULES = {
 _NAMES = {
     "data.io": ("read",),
     "data.recording": ("Recording", "pad", "stack"),
-    "explanation": ("Explanation", "explain"),
+    "explanation": ("Earlier", "Explanation", "explain"),
     "identification.identified": ("Identified", "Result"),
     "identification.identifying": ("identify",),
     "identification.projections": ("ClosedWindows", "WeakForm"),

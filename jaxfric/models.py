@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from . import terms as laws
+from .data.nearest import meant
 from .data.printable import listed, short
 from .data.recording import Recording, described
 from .looks import html, text
@@ -277,7 +278,8 @@ def named(name: str) -> Sum:
     """The model of that name; raises `ValueError`, with the names there are, for another."""
     stem = name.removeprefix("symmetric-").replace("_", "-")
     if stem not in NAMED:
-        raise ValueError(f"No model is called {name!r}; there are {', '.join(names())}.")
+        near = meant(name, names())
+        raise ValueError(f"No model is called {name!r}; there are {', '.join(names())}.{near}")
     return symmetric(NAMED[stem]()) if name.startswith("symmetric-") else NAMED[stem]()
 
 

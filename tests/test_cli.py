@@ -352,7 +352,7 @@ def test_where_compiled_programs_are_kept(monkeypatch, tmp_path):
 def test_demo_from_the_core_dependencies_alone(tmp_path):
     hide = "".join(
         f"sys.modules[{name!r}] = None\n"
-        for name in ("matplotlib", "plotly", "pyarrow", "h5py", "rich")
+        for name in ("matplotlib", "jinja2", "pyarrow", "h5py", "rich")
     )
     code = f"import sys\n{hide}from jaxfric.cli import main\nsys.exit(main(['demo']))\n"
     done = run(code=code, cwd=tmp_path)

@@ -990,7 +990,7 @@ def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(
         fit = {"force_error": {"before": before, "after": after}, "noise_floor": floor}
         fit["holdout_force_error"] = held and {"before": 0.1, "after": held}
         shares = {name: moment if name == "friction_step" else 0.1 for name in named}
-        return telling._rough(fit, shares)
+        return telling.rough(fit, shares)
 
     # Four times the noise, and beside findings that leave half of the mismatch 1.25 times.
     assert rough(0.09) and not rough(0.07)

@@ -437,7 +437,7 @@ def test_what_a_target_cannot_express_is_named_with_those_that_can(target, term,
 @pytest.mark.parametrize(
     ("target", "options", "words"),
     [
-        ("matlab", {}, "no target 'matlab'; there are c, modelica"),
+        ("matlab", {}, "no target 'matlab'; there are c, st, modelica"),
         ("c", {"name": "2nd axis"}, "--name"),
         ("c", {"name": "double"}, "--name"),
         ("modelica", {"name": "block"}, "--name"),

@@ -71,7 +71,9 @@ def test_imports_go_down_the_layout(path):
 def test_the_guide_says_where_everything_is():
     """Its table lists every package, from the bottom up, and nothing else."""
     listed = re.findall(r"^\| `jaxfric/(\w+)(?:/|\.py)` \|", GUIDE.read_text("utf-8"), re.MULTILINE)
-    there = {path.stem for path in PACKAGE.iterdir() if not path.name.startswith("__")}
+    there = {
+        path.stem for path in PACKAGE.iterdir() if path.name[:2] != "__" and path.name != "py.typed"
+    }
     assert set(listed) == there
     assert listed == [name for name in ORDER if name in there]
 

@@ -6,6 +6,8 @@ Nothing heavy is imported before a command runs, so that `jaxfric --help` answer
 import argparse
 import gc
 import os
+import re
+import shlex
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -14,11 +16,14 @@ from io import TextIOWrapper
 from pathlib import Path
 
 from . import options
+from .examples import EXAMPLES
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status: 0 done, 2 bad input or usage."""
-    arguments = _parser().parse_args(argv)
+    given = sys.argv[1:] if argv is None else list(argv)
+    arguments = _parser().parse_args(given)
+    arguments.typed = shlex.join(["jaxfric", *given])
     name = f"jaxfric {arguments.command}"
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # what its encoding lacks is no reason to fail
@@ -82,7 +87,21 @@ class _Parser(argparse.ArgumentParser):
     """A parser whose complaint is one line, as every other message of the command."""
 
     def error(self, message: str):
-        self.exit(2, f"{self.prog}: {options.printable(message)} (see {self.prog} --help)\n")
+        said = f"{self.prog}: {options.printable(message)}.{self._meant(message)}"
+        self.exit(2, f"{said} (see {self.prog} --help)\n")
+
+    def _meant(self, message: str) -> str:
+        """What the user may have meant by an option or a choice that there is not."""
+        if choice := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            return options.meant(choice[1], re.findall(r"[\w.-]+", choice[2]))
+        if unknown := re.search(r"unrecognized arguments: (?:.* )?(--[\w-]+)", message):
+            known = [*self._option_string_actions]
+            for action in self._actions:
+                if isinstance(action, argparse._SubParsersAction) and action.choices:
+                    for command in action.choices.values():
+                        known += command._option_string_actions
+            return options.meant(unknown[1], known)
+        return ""
 
 
 class _Version(argparse.Action):
@@ -138,7 +157,14 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add(commands, name: str, run: str, text: str) -> argparse.ArgumentParser:
-    command = commands.add_parser(name, help=text, description=text, allow_abbrev=False)
+    command = commands.add_parser(
+        name,
+        help=text,
+        description=text,
+        allow_abbrev=False,
+        epilog=EXAMPLES[name],
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     command.set_defaults(run=_lazily(run))
     return command
 
@@ -183,9 +209,10 @@ def _add_explain(commands) -> None:
     base = command.add_mutually_exclusive_group()
     base.add_argument(
         "--baseline",
-        metavar="NAME_OR_MODEL.json",
-        help="a name that jaxfric models lists, or a saved model (default: gaussian; with "
-        "--columns known_force=NAME your simulator's force, as it is)",
+        metavar="NAME_OR_FILE",
+        help="a name that jaxfric models lists; a saved model, MODEL.json; or an earlier recording "
+        "of this machine: what changed (default: gaussian; with --columns known_force=NAME your "
+        "simulator's force, as it is)",
     )
     base.add_argument(
         "--simulation",
@@ -264,7 +291,10 @@ def _add_export(commands) -> None:
     command = _add(commands, "export", "export.run", "hand a model over to another program")
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument(
-        "--to", required=True, choices=("c", "modelica", "mujoco", "urdf", "table"), help="target"
+        "--to",
+        required=True,
+        choices=("c", "st", "modelica", "mujoco", "urdf", "table"),
+        help="target",
     )
     command.add_argument(
         "-o", "--out", type=options.output, default="-", metavar="OUT", help="default: printed"

@@ -3,7 +3,8 @@
 import dataclasses
 import sys
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
         units=arguments.units,
         period=arguments.period,
         repair=arguments.repair,
+        rate=arguments.rate,
         **more,
     )
 
@@ -124,7 +126,7 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
     if arguments.save:
-        put(arguments.save, documents.to_json(found.model.to_dict()))
+        put(arguments.save, documents.to_json(documents.saved(found.model, recording)))
     if arguments.plot:
         draw(found, recording, arguments.plot)
     return document
@@ -155,6 +157,24 @@ def put_table(path: str, columns: Mapping[str, Any], notes: Sequence[str], summa
         write_table(path, columns)
     beside = sys.stderr if standard(path) else sys.stdout
     say("\n".join([*(f"  {note}" for note in notes), f"{path}: {summary}"]), file=beside)
+
+
+@contextmanager
+def working(text: str) -> Iterator[Callable[[str], None]]:
+    """Says on standard error what is being done, on a terminal only; by rich where it is there."""
+    if not sys.stderr.isatty():
+        yield lambda stage: None
+        return
+    try:
+        from rich.console import Console
+        from rich.text import Text
+    except ImportError:
+        show_progress(text)
+        yield lambda stage: show_progress(f"{text}: {stage}")
+        show_progress("")
+        return
+    with Console(stderr=True).status(Text(printable(text))) as status:
+        yield lambda stage: status.update(Text(printable(f"{text}: {stage}")))
 
 
 def show_progress(text: str) -> None:

@@ -9,6 +9,7 @@ from ..identification import documents, tabulate
 from ..report import page, pictures
 from ..validation import concealed
 from . import commands
+from .explain import today
 from .options import say
 
 # One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.
@@ -35,13 +36,17 @@ def run(arguments: Namespace) -> int:
     say(f"\nConcealed was: {_truth(machine)}")
     write_text(folder / "identification.json", documents.to_json(document))
     write_text(folder / "explanation.json", documents.to_json(told))
-    write_text(folder / "model.json", documents.to_json(found.model.to_dict()))
+    write_text(
+        folder / "model.json", documents.to_json(documents.saved(found.model, recording, holdout))
+    )
     written = ["axis.csv", "holdout.csv", "identification.json", "explanation.json", "model.json"]
     missing = ""
     try:
         pictures.library()
+        page.library()
         commands.draw(fitted, recording, folder / "friction.png")
-        write_text(folder / "explanation.html", page.render(told, found.curves))
+        text = page.render(told, found.curves, arguments.typed, today())
+        write_text(folder / "explanation.html", text)
         written += ["friction.png", "explanation.html"]
     except ValueError as error:
         missing = f"\nNo pictures: {error}"

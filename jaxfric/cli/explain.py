@@ -1,26 +1,30 @@
 """`jaxfric explain`: what a model leaves out of a recording."""
 
 import dataclasses
+import os
+import time
 from argparse import Namespace
+from datetime import UTC, datetime
 from pathlib import Path
 
+from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
-from ..explanation import Explanation, explain
+from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
 from ..identification import documents, tabulate
 from ..models import Model, load, named
 from ..programs import kept_in
-from ..report import charts, page
+from ..report import page
 from ..simulators import Known, Mujoco, same_motion
 from ..terms import KNOWN_FORCE
-from .commands import programs_folder, put, read
+from .commands import programs_folder, put, read, working
 from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
     """Explain one recording; print it, and write what was asked for."""
     if arguments.report:
-        charts.library()
+        page.library()
     recording, notes = read(arguments.file, arguments)
     holdout = None
     if arguments.holdout:
@@ -28,15 +32,23 @@ def run(arguments: Namespace) -> int:
         notes = notes + [f"Held out: {note}" for note in more]
     baseline = _baseline(arguments, recording, holdout)
     try:
-        with kept_in(programs_folder()):
+        with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
             found = explain(
-                recording, baseline, holdout, fixed=arguments.fixed, simulate=arguments.simulate
+                recording,
+                baseline,
+                holdout,
+                fixed=arguments.fixed,
+                simulate=arguments.simulate,
+                doing=doing,
             )
     except ValueError as error:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()
     document["recording"]["notes"] = notes
-    texts = written(found, document, arguments)
+    for path in (arguments.baseline, arguments.simulation, arguments.mujoco):
+        if path and (digest := sha256(path)):
+            document["baseline"] |= {"file": path, "sha256": digest}
+    texts = written(found, document, arguments, (recording, holdout))
     # First what lasts: who reads the table may close the pipe.
     for path, text in texts.items():
         put(path, text)
@@ -45,16 +57,25 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def written(found: Explanation, document: dict, arguments: Namespace) -> dict[str, str]:
+def written(
+    found: Explanation, document: dict, arguments: Namespace, recordings: tuple
+) -> dict[str, str]:
     """The JSON, the model and the page by the path that was given for each, all of them ready."""
     texts = {}
     if arguments.json:
         texts[arguments.json] = documents.to_json(document)
     if arguments.save:
-        texts[arguments.save] = documents.to_json(found.model.to_dict())
+        texts[arguments.save] = documents.to_json(documents.saved(found.model, *recordings))
     if arguments.report:
-        texts[arguments.report] = page.render(document, found.curves)
+        texts[arguments.report] = page.render(document, found.curves, arguments.typed, today())
     return texts
+
+
+def today() -> str:
+    """The date in universal time; that of SOURCE_DATE_EPOCH, where a build is to be repeated."""
+    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = int(stamp) if stamp.isdecimal() else time.time()
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d")
 
 
 def _simulation(
@@ -96,7 +117,7 @@ def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Reco
 
 def _baseline(
     arguments: Namespace, recording: Recording, holdout: Recording | None
-) -> str | Model | Recording | Known | Mujoco:
+) -> str | Model | Recording | Earlier | Known | Mujoco:
     if arguments.joint and not arguments.mujoco:
         raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
     if arguments.mujoco:
@@ -110,10 +131,13 @@ def _baseline(
     text = arguments.baseline
     if not text.endswith(".json"):
         if Path(text).is_file():
-            raise ValueError(
-                f"--baseline {text}: a model is a .json file; another simulator's output goes to "
-                "--simulation."
-            )
+            other = _beside(text, recording, arguments)[0]
+            if other.sha256 == recording.sha256:
+                raise ValueError(
+                    f"--baseline {text}: this is {arguments.file} itself. Give an earlier "
+                    "recording of the machine."
+                )
+            return Earlier(other)
         named(text)
         return text
     try:

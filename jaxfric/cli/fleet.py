@@ -76,6 +76,7 @@ def _options(arguments: Namespace) -> fleet.Options:
         arguments.units,
         arguments.period,
         arguments.repair,
+        arguments.rate,
     )
 
 

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TextIO
 
+from ..data.nearest import meant as meant
 from ..data.printable import printable
 from ..data.targets import replaced, same, standard
 
@@ -170,6 +171,14 @@ def seconds(text: str) -> float:
     return value
 
 
+def rate(text: str) -> float:
+    """Samples per second, over zero."""
+    value = number(text)
+    if value <= 0:
+        raise ArgumentTypeError(f"{text!r} is not a number of samples per second over zero")
+    return value
+
+
 def process(text: str) -> tuple[int, int, str]:
     """`i/n@host:port` as the number of a process, how many there are, and the address of the
     first.
@@ -222,6 +231,12 @@ def reading(command: ArgumentParser) -> None:
         default={},
         metavar="position=NUMBER",
         help="the position is counted modulo this, before scaling: make it continuous",
+    )
+    group.add_argument(
+        "--rate",
+        type=rate,
+        metavar="HZ",
+        help="samples per second of a file without a time column",
     )
     group.add_argument(
         "--no-repair",

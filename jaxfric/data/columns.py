@@ -7,6 +7,8 @@ for a role are an error, and a unit in a name is reported or refused but never c
 import re
 from collections.abc import Iterable, Mapping
 
+from .languages import PARTICLES, english, plain
+from .nearest import meant
 from .printable import listed
 from .spellings import FITTING, spelt, unit_of
 
@@ -45,8 +47,10 @@ _REMARK = re.compile(
 
 
 def _words(name: str) -> list[str]:
-    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.rsplit(".", 1)[-1])
-    return [word for word in re.split(r"[^0-9a-zµμ°%]+", name.lower()) if word]
+    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", plain(name).rsplit(".", 1)[-1])
+    words = [word for word in re.split(r"[^\w°%]+|_+", name.lower()) if word]
+    words = [word for word in words if word not in PARTICLES] or words
+    return [each for word in words for each in english(word)]
 
 
 def _plain_role(words: list[str]) -> str | None:
@@ -67,6 +71,7 @@ def _role_of_words(words: list[str]) -> str | None:
 
 def describe(name: str) -> tuple[str | None, str | None]:
     """The role that a column's name stands for and the unit that it states, each or `None`."""
+    name = plain(name)
     bracket = _BRACKETS.search(name)
     words = _words(_BRACKETS.sub(" ", name))
     if (role := _role_of_words(words)) is not None:
@@ -171,7 +176,8 @@ def _find(names: list[str], name: str, role: str, source: str) -> str:
     if len(alike) == 1:
         return alike[0]
     raise ValueError(
-        f"{source}: there is no column {name!r} for the {role}. The columns are: {listed(names)}."
+        f"{source}: there is no column {name!r} for the {role}.{meant(name, names)} The columns "
+        f"are: {listed(names)}."
     )
 
 
@@ -182,9 +188,10 @@ def _check_needed(chosen: Mapping[str, str], names: list[str], source: str) -> N
     if missing:
         wanted = ["position or velocity" if role == "position" else role for role in missing]
         example = ",".join(f"{role}=NAME" for role in missing)
+        clock = " Without a clock: --rate HZ (rate=)." if "time" in missing else ""
         raise ValueError(
             f"{source}: no column is recognised as {' nor as '.join(wanted)}. The columns are: "
-            f"{listed(names)}. Name them: --columns {example}."
+            f"{listed(names)}. Name them: --columns {example}.{clock}"
         )
 
 

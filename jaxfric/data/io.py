@@ -10,8 +10,10 @@ import numpy as np
 
 from . import columns as names, stamps
 from .cleaning import clean
+from .clocked import CLOCK, clocked
 from .delimited import Table, numbers
 from .printable import encodable
+from .provenance import sha256
 from .recording import Recording
 from .tables import load
 from .writing import (
@@ -32,6 +34,7 @@ def read(
     format: str | None = None,
     period: Mapping[str, float] | None = None,
     repair: bool = True,
+    rate: float | None = None,
 ) -> Recording:
     """Read one log: CSV, Parquet, MATLAB `.mat` or NumPy `.npz`.
 
@@ -51,6 +54,7 @@ def read(
       certain.
     - `repair`: with `False` all samples stay as they are, but for those that cannot be computed
       with: what is not finite is masked, and stamps that do not increase are an error.
+    - `rate`: samples per second of a file that has no time column, 1/s.
 
     **Returns:** a `Recording` with signals of shape `(N,)`, in jax's default float type.
 
@@ -64,6 +68,7 @@ def read(
         format=format,
         period=period,
         repair=repair,
+        rate=rate,
     )[0]
 
 
@@ -76,6 +81,7 @@ def read_with_notes(
     format: str | None = None,
     period: Mapping[str, float] | None = None,
     repair: bool = True,
+    rate: float | None = None,
     set_point: bool = False,
 ) -> tuple[Recording, list[str]]:
     """[`read`][] together with one plain sentence for each thing that was put in order.
@@ -88,6 +94,9 @@ def read_with_notes(
     path, source = Path(path), encodable(os.fspath(path))
     scale, units, period = dict(scale or {}), dict(units or {}), dict(period or {})
     table = load(path, format)
+    if rate is not None:
+        table = clocked(table, rate, columns, source)
+        columns = dict(columns or {}) | {"time": CLOCK}
     chosen = names.assign(table.columns, columns, source, set_point)
     _check_arguments(chosen, scale, units, period, source)
     names.check_per_second(chosen, scale, source)
@@ -116,6 +125,7 @@ def read_with_notes(
         channels={role: scaled[role] for role in scaled if role not in _SIGNALS},
         units=tuple(names.units(chosen, scale, units).items()),
         source=source,
+        sha256=sha256(path),
     )
     return recording, notes
 

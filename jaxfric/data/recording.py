@@ -64,7 +64,7 @@ class Recording(eqx.Module):
       samples are missing), shape `(N,)`, numbered from 0 in order; one segment by default.
     - `channels`: further signals by role (`reference`, `load`, `temperature`, …), each `(N,)`.
     - `units`: names of the force and the position unit, `{"force": "N", "position": "m"}`.
-    - `source`: where the recording comes from, for messages.
+    - `source`: where the recording comes from, for messages; `sha256`: of that file.
     - `num_segments`: a static bound on the number of segments; counted where `None`.
 
     **Raises:** `ValueError` if the shapes differ or if neither position nor velocity is given.
@@ -81,6 +81,7 @@ class Recording(eqx.Module):
         static=True, default=(), converter=lambda units: tuple(sorted((SI | dict(units)).items()))
     )
     source: str = eqx.field(static=True, default="")
+    sha256: str = eqx.field(static=True, default="", kw_only=True)
     num_segments: int | None = eqx.field(static=True, default=None)
 
     def __post_init__(self):
@@ -231,7 +232,7 @@ def uniform(recording: Recording) -> Recording:
     steps = PADDING if power >= LONG else (1, 2)
     length = next(int(f * power) for f in steps if f * power >= recording.num_samples)
     pieces = 1 << (recording.num_segments - 1).bit_length()
-    return dataclasses.replace(pad(recording, length), source="", num_segments=pieces)
+    return dataclasses.replace(pad(recording, length), source="", sha256="", num_segments=pieces)
 
 
 def stack(recordings: Sequence[Recording]) -> Recording:
@@ -279,4 +280,4 @@ def _kinds(recording: Recording) -> Mapping[str, object]:
 
 
 def _anonymous(recording: Recording, segments: int) -> Recording:
-    return dataclasses.replace(recording, source="", num_segments=segments)
+    return dataclasses.replace(recording, source="", sha256="", num_segments=segments)

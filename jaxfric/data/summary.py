@@ -17,6 +17,7 @@ def facts(recording: Any, notes: Sequence[str] = ()) -> dict[str, Any]:
     steps = np.diff(time)[np.diff(segment) == 0]
     return {
         "file": recording.source,
+        "sha256": recording.sha256 or None,
         "samples": int(mask.size),
         "used": int(np.count_nonzero(mask)),
         "segments": int(np.unique(segment).size),

@@ -6,25 +6,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data.recording import Recording, described
+from ..data.recording import described
 from ..identification.identified import Identified
 from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
-from . import parameters as spelled
 from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
-from .naming import LEAST_SHARE, LINEARITY, Named
+from .naming import LEAST_SHARE, LINEARITY
 from .predictions import with_predictions
 from .regression import RANK, Fit, fit, orthonormal, solve
 
 
 class Baseline(NamedTuple):
-    """A sum of terms, its name, and its parameters where it comes with values."""
+    """A sum of terms, its name, and its parameters where it comes with values.
+
+    Of another recording also what it obeys, term by term, `fit`, and the standard errors of its
+    parameters, affine ones first, `(P,)`; `left`, the coordinates over which structure is left
+    there, and whether what is left is `rough`: neither is a difference.
+    """
 
     structure: AbstractTerm
     name: str
     model: Model | None = None
+    errors: np.ndarray | None = None
+    fit: Fit | None = None
+    left: frozenset[str] = frozenset()
+    rough: bool = False
 
 
 class Mismatch(NamedTuple):
@@ -32,13 +40,15 @@ class Mismatch(NamedTuple):
 
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
     `share`: part of the mean-square residual before that the right values remove; `p_value`;
-    `energy`: of the residual before, N².
+    `energy`: of the residual before, N²; `within`: numbers of those that move with the others, by
+    no more than is uncertain.
     """
 
     moved: dict[int, float]
     share: float
     p_value: float
     energy: float
+    within: frozenset[int] = frozenset()
 
 
 def baseline_of(given) -> Baseline:
@@ -60,7 +70,7 @@ def baseline_of(given) -> Baseline:
     raise ValueError(
         f"baseline is {described(given)}; give a model's name, a sum of terms, a Model, an "
         "Identified, simulators.Known(force), a function from a recording to a simulator's force, "
-        "or a Recording of another simulator."
+        "or a Recording: an earlier one of this machine, or of another simulator."
     )
 
 
@@ -72,13 +82,6 @@ def _check_values(model: Model) -> None:
             f"The baseline has no value for {', '.join(lacking)}, which its recording did not "
             "show. Give the model's name, or its terms alone, to have all of them fitted."
         )
-
-
-def simulated(simulation: Recording, found: Named) -> Baseline:
-    """The baseline that another simulator's output obeys, as explaining that output found it."""
-    return Baseline(
-        spelled.whole(found.last), "simulation", spelled.model(found.last, simulation.units)
-    )
 
 
 def at_values(model: Model, evidence: Evidence) -> Fit:

@@ -6,32 +6,19 @@ from typing import Any
 import numpy as np
 
 from ..models import Model
+from .bins import Axis, Bins, axis
 from .evidence import Evidence
-from .locate import Place, coordinates
-from .predictions import rate, with_predictions
+from .locate import Place
+from .predictions import with_predictions
 from .regression import Fit
 from .verification import residual
 
-BINS = 48
 # More points than a screen has columns show nothing more.
 MOST_POINTS = 3000
-_UNITS = {
-    "time": "s",
-    "time_since_reversal": "s",
-    "position": "{position}",
-    "velocity": "{position}/s",
-    "distance_since_reversal": "{position}",
-    "acceleration": "{position}/s²",
-    "predicted_force": "{force}",
-    "force_rate": "{force}/s",
-    "neighbour": "{position}/s",
-}
-
-
-def unit(coordinate: str, units: Mapping[str, str]) -> str:
-    """The unit of a coordinate; empty for a signal whose unit nobody gave (load, temperature)."""
-    stem = coordinate.removesuffix("_lines").partition("_by_")[0]
-    return _UNITS.get(stem, "").format(**units)
+# A step between rows of more than so many usual ones is a gap: rest, a reversal, another segment.
+GAP = 2.5
+# A direction with fewer rows was not seen.
+FEWEST = 20
 
 
 def curves(
@@ -50,7 +37,7 @@ def curves(
         "units": dict(units),
         "map": [_mapped(place, before, after, seen, units) for place in places],
         "time": _series(evidence, before, after),
-        "friction": _friction(models, evidence),
+        "friction": _friction(models, evidence, after),
     }
     if held is not None:
         drawn["holdout"] = _series(held, before, after, rephased)
@@ -58,59 +45,23 @@ def curves(
 
 
 def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dict[str, Any]:
-    """Mean residual in bins along one coordinate; a line is folded onto one period.
-
-    Of a residual in step with something else (direction, velocity, acceleration) its size where
-    that has its root mean square.
-    """
-    name = place.coordinate
-    if name.endswith("_lines"):
-        stem = name.removesuffix("_lines")
-        value = np.asarray(getattr(seen.motion, stem))[seen.centre]
-        beside = np.ones_like(value)
-        period = 1 / place.peak
-        value = np.mod(value, period)
-        label = f"{stem}, folded at {period:.4g} {unit(name, units)}"
-    else:
-        nodes, _, kind = coordinates(seen)[name]
-        value = (rate(seen, nodes) if kind == "rate" else nodes)[seen.centre]
-        label = name.replace("_", " ")
-        beside = _beside(name, seen)
-    edges = np.quantile(value, np.linspace(0, 1, BINS + 1))
-    bin_ = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, BINS - 1)
-    count = np.bincount(bin_, minlength=BINS)
-    weight = np.bincount(bin_, beside**2, BINS)
-    full = (count > 1) & (weight > 0)
-    count, weight = np.where(full, count, 1), np.where(full, weight, 1.0)
-
-    def mean(values):
-        return (np.bincount(bin_, beside * values, BINS) / weight)[full]
-
-    spread = np.sqrt(np.bincount(bin_, before.residual**2, BINS) / count / weight)
+    """Mean residual in bins along one coordinate; a line is folded onto one period."""
+    lined = place.coordinate.endswith("_lines")
+    along = axis(place.coordinate, seen, units, 1 / place.peak if lined else None)
+    bins = Bins(along)
     return {
-        "coordinate": label,
-        "unit": unit(name, units),
-        "at": (np.bincount(bin_, value, BINS) / count)[full].tolist(),
-        "before": mean(before.residual).tolist(),
-        "after": mean(after.residual).tolist(),
-        "error": spread[full].tolist(),
+        "name": place.coordinate,
+        "coordinate": along.label,
+        "unit": along.unit,
+        "at": bins.at.tolist(),
+        "before": bins.mean(before.residual).tolist(),
+        "after": bins.mean(after.residual).tolist(),
+        "error": bins.error(before.residual).tolist(),
     }
 
 
-def _beside(name: str, seen: Evidence) -> np.ndarray:
-    """What a residual over that coordinate is in step with, in parts of its root mean square."""
-    velocity = np.asarray(seen.motion.velocity)
-    if name.endswith("_by_velocity"):
-        values = velocity[seen.centre]
-    elif name.endswith("_by_acceleration"):
-        values = rate(seen, velocity)[seen.centre]
-    else:
-        sided = name.endswith("_by_direction") or "since" in name
-        values = seen.side if sided else np.ones(len(seen.centre))
-    return values / np.sqrt(np.mean(values**2))
-
-
 def _series(evidence: Evidence, before: Fit, after: Fit, rephased=frozenset()) -> dict[str, Any]:
+    """Force over time without interruptions; where rows are missing stands `None`."""
     step = max(1, -(-len(evidence.target) // MOST_POINTS))
     time = evidence.elapsed[evidence.centre]
     series = {
@@ -119,12 +70,47 @@ def _series(evidence: Evidence, before: Fit, after: Fit, rephased=frozenset()) -
         "before": evidence.force - residual(before, evidence),
         "after": evidence.force - residual(after, evidence, rephased),
     }
-    return {name: values[::step].tolist() for name, values in series.items()}
+    shown = {name: values[::step] for name, values in series.items()}
+    steps = np.diff(shown["time"])
+    gaps = 1 + np.flatnonzero(steps > GAP * np.median(steps)) if len(steps) else np.zeros(0, int)
+    middle = shown["time"][gaps - 1] + 0.5 * steps[gaps - 1] if len(gaps) else np.zeros(0)
+    lists = {
+        name: np.insert(values, gaps, middle if name == "time" else np.nan).tolist()
+        for name, values in shown.items()
+    }
+    return {
+        name: [None if value != value else value for value in values]
+        for name, values in lists.items()
+    }
 
 
-def _friction(models: tuple[Model, Model], evidence: Evidence) -> dict[str, Any]:
-    top = evidence.limits.fastest
-    speed = np.geomspace(evidence.limits.slowest, top, 120)
-    velocity = np.concatenate([-speed[::-1], speed])
-    before, after = (np.asarray(model.friction(velocity)).tolist() for model in models)
-    return {"velocity": velocity.tolist(), "before": before, "after": after}
+def _friction(models: tuple[Model, Model], evidence: Evidence, after: Fit) -> dict[str, Any]:
+    """Friction curves over the speeds that were seen, each direction by itself.
+
+    What is measured of it is the improved model's friction and what that leaves of the force.
+    """
+    speeds = np.asarray(evidence.motion.velocity)[evidence.centre]
+    parts, at, measured, error = [], [], [], []
+    slip = np.asarray(models[1].friction(speeds))
+    for side in (-1, 1):
+        rows = (evidence.side == side) & (speeds * side > 0)
+        if np.count_nonzero(rows) < FEWEST:
+            continue
+        low, high = np.quantile(side * speeds[rows], [0.01, 1.0])
+        parts.append(np.sort(side * np.geomspace(low, high, 120)))
+        bins = Bins(Axis("velocity", "", speeds[rows], np.ones(np.count_nonzero(rows))))
+        left = after.residual[rows]
+        at += bins.at.tolist()
+        measured += bins.mean(slip[rows] + left).tolist()
+        error += bins.error(left).tolist()
+    velocity = np.concatenate(parts) if parts else np.zeros(0)
+    curves = (np.asarray(model.friction(velocity)).tolist() for model in models)
+    before, now = ([v if np.isfinite(v) else None for v in curve] for curve in curves)
+    return {
+        "velocity": velocity.tolist(),
+        "before": before,
+        "after": now,
+        "at": at,
+        "measured": measured,
+        "error": error,
+    }

@@ -234,7 +234,7 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
     and by how much that velocity has been smoothed, in samples².
     """
     # The name and the number of segments would be compiled in.
-    nameless = dataclasses.replace(recording, source="", num_segments=1)
+    nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
     padded = pad(nameless, _length(recording.num_samples))
     if padded.velocity is not None:
         return padded, 0.0

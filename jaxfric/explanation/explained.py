@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..data.provenance import versions
 from ..identification import tabulate
 from ..identification.uncertainty import Estimate
 from ..looks import drawing, html, text
@@ -23,6 +24,16 @@ VERDICTS = {
     "unexplained": "Something is missing that no effect of the library accounts for.",
 }
 
+# The same where the baseline is another recording.
+CHANGES = {
+    "consistent": "Nothing differs between the two recordings beyond the noise.",
+    "explained": "What is named accounts for the difference between the two recordings.",
+    "partly_explained": "What is named accounts for a part of the difference between the two "
+    "recordings; more is left.",
+    "unexplained": "The two recordings differ by something that no effect of the library "
+    "accounts for.",
+}
+
 # Pictures in a notebook and in a window: what fits on a screen.
 SKETCHED, DRAWN = 4, 6
 
@@ -31,12 +42,16 @@ DOUBTED = "Until that is put right, nothing is named."
 
 
 class Moved(NamedTuple):
-    """A parameter of the baseline whose value is wrong: before, after, standard error, unit."""
+    """A parameter of the baseline whose value is wrong: before, after, standard error, unit.
+
+    `before_error`: the standard error of the value before, where that is known.
+    """
 
     before: float
     value: Any
     standard_error: Any
     unit: str
+    before_error: float = 0.0
 
 
 class Finding(NamedTuple):
@@ -73,6 +88,7 @@ class Explanation:
     - `not_visible`: the smallest size of each other effect that this recording would have shown.
     - `model`: baseline and found terms, for predict, simulate and export.
     - `baseline`: the baseline with its parameters; `baseline_parameters` with standard errors.
+    - `recording`, `holdout`: file and its SHA-256, samples, duration and rate of each.
     - `curves`: what pictures are drawn from.
     - `warnings`: what makes the answer doubtful, each with `name`, `text` and whether it is
       `severe`: then what would be said beside it is certain to be wrong.
@@ -94,6 +110,7 @@ class Explanation:
     baseline_name: str
     baseline_parameters: dict[str, Estimate]
     recording: dict[str, Any]
+    holdout: dict[str, Any] | None = None
     curves: dict[str, Any] = dataclasses.field(default_factory=dict, repr=False)
     warnings: list[dict[str, Any]] = dataclasses.field(default_factory=list)
     holdout_model: Model | None = None
@@ -122,6 +139,8 @@ class Explanation:
             ],
             "fit": self.fit,
             "not_visible": self.not_visible,
+            "holdout": self.holdout,
+            "versions": versions(),
         }
 
     def __repr__(self) -> str:
@@ -176,7 +195,8 @@ class Explanation:
         """The verdict in words: what is certain to be wrong first, then the force errors."""
         severe = [each["text"] for each in self.warnings if each["severe"]]
         other = [each["text"] for each in self.warnings if each["name"] == "not_better"]
-        verdict = DOUBTED if severe and not self.findings else VERDICTS[self.verdict]
+        words = CHANGES if self.baseline_name.startswith("recording") else VERDICTS
+        verdict = DOUBTED if severe and not self.findings else words[self.verdict]
         said = [*severe, verdict, *other, _errors(self.fit, bool(self.findings))]
         return " ".join([*said, *_not_determined(self.fit)])
 
@@ -251,6 +271,8 @@ def _estimate(estimate: Estimate | Moved) -> dict[str, Any]:
     error = float(estimate.standard_error)
     rest = {"standard_error": error if math.isfinite(error) else None, "unit": estimate.unit}
     if isinstance(estimate, Moved):
-        return {"from": float(estimate.before), "to": float(estimate.value), **rest}
+        moved = {"from": float(estimate.before), "to": float(estimate.value), **rest}
+        own = float(estimate.before_error)
+        return moved | ({"from_standard_error": own} if 0 < own < math.inf else {})
     value = float(estimate.value)
     return {"value": value if math.isfinite(value) else None, **rest}

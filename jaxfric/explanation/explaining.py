@@ -1,7 +1,7 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
 import dataclasses
-from collections.abc import Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 
 import jax
 import jax.numpy as jnp
@@ -17,10 +17,11 @@ from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, threads, verification
-from .baseline import Baseline, as_given, at_values, baseline_of, mismatch, simulated
+from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
 from .candidates import OF_THE_MOMENT
 from .contest import Contest, contest
 from .doubts import contradicted
+from .earlier import Earlier, changed, obeyed, rephased
 from .explained import Explanation
 from .figures import Figures, cast
 from .forward import motion_error
@@ -29,19 +30,20 @@ from .naming import LATER_SHARE, LEAST_OF_BASE, LINEARITY, MOST, OF_BASE, Named,
 from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
-from .telling import tell
+from .telling import facts, tell
 from .timing import LATE, late, overlooked, settled
 from .views import weightless
 
 
 def explain(
     recording: Recording,
-    baseline: str | AbstractTerm | Model | Identified | Recording = "gaussian",
+    baseline: str | AbstractTerm | Model | Identified | Recording | Earlier = "gaussian",
     holdout: Recording | None = None,
     *,
     fixed: bool = False,
     simulate: bool = False,
     seed: int = 0,
+    doing: Callable[[str], None] = lambda stage: None,
 ) -> Explanation:
     """What a model leaves out of a recording: where, what, how much, and what could not be seen.
 
@@ -53,11 +55,11 @@ def explain(
       simulator's force along the recorded motion (`jf.simulators.Known`, any function from a
       recording to it, `(N,)`, or a recording of the same motion), which stands as it is; or a
       recording of the same reference run through another simulator, which a sum of terms is
-      fitted to.
+      fitted to; or an earlier recording of the machine, `Earlier(recording)`: what has changed.
     - `fixed`: values that are not found wrong stay as given, instead of being refitted.
     - `simulate`: run both models forward, from the recorded motion and by the recorded force, piece
       by piece, and compare the velocities (`fit["simulation_error"]`); takes some seconds more.
-    - `seed`: of the bootstrap.
+    - `seed`: of the bootstrap; `doing`, called with what is being done, in words.
 
     **Raises:** `ValueError` if a recording slips for too short a time to tell structure from
     chance.
@@ -67,12 +69,15 @@ def explain(
     if holdout is not None:
         require(holdout, "explain (holdout)")
         require_force(holdout, "explain (holdout)")
-    if isinstance(baseline, Recording):
-        require(baseline, "explain (baseline)")
-    for other in (holdout, baseline):
+    known = baseline.recording if isinstance(baseline, Earlier) else baseline
+    if isinstance(known, Recording):
+        require(known, "explain (baseline)")
+    for other in (holdout, known):
         if isinstance(other, Recording):
             check_same_units(recording, other)
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
+    if isinstance(baseline, Earlier):
+        baseline = baseline.recording
     if not isinstance(baseline, Recording):
         baseline_of(baseline)
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
@@ -81,7 +86,9 @@ def explain(
     # A few thousand rows: single precision would save nothing.
     with jax.enable_x64(True), threads.single():
         held, remarks = None if theirs is None else cast(theirs), [*remarks, *more]
-        told = _explain(cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed)
+        told = _explain(
+            cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed, doing
+        )
     models = {
         name: None if model is None else _as_seen(figures.own(model), recording)
         for name in ("model", "baseline", "holdout_model")
@@ -90,7 +97,8 @@ def explain(
     values = dict(told.baseline_parameters)
     for name in unseen(values, recording):
         values[name] = values[name]._replace(value=np.float64(np.nan))
-    return dataclasses.replace(told, **models, baseline_parameters=values)
+    held_out = None if holdout is None else facts(holdout)
+    return dataclasses.replace(told, **models, baseline_parameters=values, holdout=held_out)
 
 
 def _as_seen(model: Model, recording: Recording) -> Model:
@@ -164,29 +172,49 @@ def _spikes(recording: Recording, lone: np.ndarray) -> Remark:
 
 
 def _explain(
-    recording, baseline, holdout, figures: Figures, remarks, fixed: bool, simulate: bool, seed: int
+    recording,
+    baseline,
+    holdout,
+    figures: Figures,
+    remarks,
+    fixed: bool,
+    simulate: bool,
+    seed: int,
+    doing: Callable[[str], None],
 ) -> Explanation:
+    doing("fitting the baseline")
     known = _known(baseline, seed)
     asked = ask(recording, holdout, known.structure)
+    if known.fit is not None:
+        known = rephased(known, asked.evidence)
     remarks = [*remarks, *_contradictions(asked)]
     wrong = None
     if any(remark.severe for remark in remarks):
         found = _nothing(asked)
         rest = asked, found
     else:
+        doing("looking for what is missing, and whether it holds")
         asked, found, rest = _found(recording, holdout, known, asked, seed)
+        doing("judging the values")
         there, left = rest
         if known.model is not None:
             wrong = mismatch(known.model, left.last, there.evidence, seed)
+        if wrong is not None and known.errors is not None:
+            here = spelled.estimates(left.last, there.block, recording.unit_names)[0]
+            names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
+            wrong = changed(wrong, known, left.last, [float(here[n].standard_error) for n in names])
         if known.model is not None and (wrong is not None or fixed):
             free = () if wrong is None else tuple(wrong.moved)
             found = _as_given(known.model, found, asked, free)
             rest = there, _as_given(known.model, left, there, free)
     first = found.base if wrong is None else at_values(known.model, asked.evidence)
+    doing("predicting with the improved model")
     better = improved(first, found, rest, asked, figures)
+    doing("locating what is left")
     wrong = wrong if better.refitted else None
     explanation = tell(recording, asked, better, known, wrong, figures, remarks, seed)
     if simulate:
+        doing("running both models forward")
         models = {"before": explanation.baseline, "after": explanation.model}
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
@@ -243,8 +271,7 @@ def _with_the_force_put_back(
 
 def _known(baseline, seed: int) -> Baseline:
     if isinstance(baseline, Recording):
-        _, found = pursue(baseline, None, named("gaussian"), seed)
-        return simulated(baseline, found)
+        return obeyed(baseline, *pursue(baseline, None, named("gaussian"), seed), seed)
     return baseline_of(baseline)
 
 

@@ -3,22 +3,7 @@
 import math
 
 from ..identification.uncertainty import Estimate
-
-
-def quantity(estimate: Estimate, scale: float = 1.0) -> str:
-    """A value with its unit and half its 95 % interval: "1.90 N ± 0.20 N"."""
-    value, error = float(estimate.value) * scale, float(estimate.standard_error) * scale
-    unit = f" {estimate.unit}" if estimate.unit not in ("", "1") else ""
-    if math.isinf(error):  # the data cannot see it, and its value is any
-        return "an amount that this recording cannot tell"
-    if not error > 0:
-        return f"{value:.3g}{unit}"
-    half = 2 * error
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    if abs(value) >= 1e5 or 0 < abs(value) < 1e-3:
-        return f"{value:.3g}{unit} ± {half:.1g}{unit}"
-    return f"{value:.{digits}f}{unit} ± {half:.{digits}f}{unit}"
-
+from .quantities import nil, quantity, turns
 
 # What each effect is, with the parameters of its term in braces.
 _TEXTS = {
@@ -31,8 +16,8 @@ _TEXTS = {
     "viscous_nonlinearity": "Friction is curved in speed, beyond a Coulomb and a viscous part",
     "gravity_unbalance": "A force that follows position with a period of {unbalance_period}, "
     "amplitude {amplitude}: gravity on an eccentric mass",
-    "cogging": "A force periodic in position, period {pitch}, amplitude {amplitude}: cogging or "
-    "screw-lead error; an unbalance would repeat once per revolution",
+    "cogging": "A force periodic in position, period {pitch}, amplitude {amplitude}: cogging of a "
+    "motor, or the error of a screw or a gear; an unbalance would repeat once per revolution",
     "spring": "A force proportional to position, {stiffness}: a spring",
     "hardening_spring": "A force that grows with the cube of position, {cubic_stiffness} about "
     "{spring_centre}: a hardening spring",
@@ -69,17 +54,68 @@ _TEXTS = {
 }
 
 
-def sentence(effect: str, parameters: dict[str, Estimate], share: float, rivals) -> str:
-    """One finding as a sentence, with its share and what it could be instead."""
+def sentence(
+    effect: str,
+    parameters: dict[str, Estimate],
+    share: float,
+    rivals,
+    stroke: float = math.inf,
+) -> str:
+    """One finding as a sentence, with its share and what it could be instead.
+
+    **Arguments:** `stroke`, the range of the position.
+    """
     # The stop at the lower end is told as the one at the upper end.
     words = {n.removeprefix("lower_"): _words(n, estimate) for n, estimate in parameters.items()}
-    text = _TEXTS.get(effect, effect.replace("_", " ")).format_map(_Gaps(words))
+    template = _slow(effect, parameters, stroke) or _TEXTS.get(effect, effect.replace("_", " "))
+    text = template.format_map(_Gaps(words))
     text += f"; {share:.0%} of the unexplained force"
     if rivals:
         text += ". This recording cannot tell it from " + " or ".join(
             name.replace("_", " ") for name in rivals
         )
     return text + "."
+
+
+# Fewer periods in the stroke are no repetition.
+REPEATED = 1.5
+# A stop is met at the end: what acts over more than this part of the stroke is something else.
+ABRUPT = 0.25
+# Over half of that, too, where at the end it is less than this part of the usual force.
+FAINT = 0.25
+# With more damping a load does not swing: its second half-wave is below a tenth of the first.
+SWINGING = 0.5
+_SLOW = {
+    "gravity_unbalance": "A force varies slowly along the stroke, by {amplitude}: it does not "
+    "repeat within the stroke, so that a spring or a cable would look the same",
+    "cogging": "A force varies slowly along the stroke, by {amplitude}: it does not repeat "
+    "within the stroke",
+    "position_dependent_friction": "Friction varies slowly along the stroke, by {amplitude}: it "
+    "does not repeat within the stroke, as with a guide or a belt that is tight in one place",
+    "position_dependent_inertia": "Inertia varies slowly along the stroke, by {amplitude}",
+}
+_SOFT = (
+    "Towards the end of the stroke a force rises slowly, from {stop_position} on by "
+    "{stop_stiffness}: a slow variation along the stroke, too soft for an end stop"
+)
+_CREEPING = (
+    "A part of the mass follows the drive late, with {load_resonance} and a damping ratio of "
+    "{damping_ratio}: too damped to swing, as with rubber, grease or a slipping coupling"
+)
+
+
+def _slow(effect: str, parameters: dict[str, Estimate], stroke: float) -> str | None:
+    """Another text where the effect's name promises more than its values hold."""
+    values = {name.removeprefix("lower_"): float(e.value) for name, e in parameters.items()}
+    period = next((v for n, v in values.items() if n == "pitch" or n.endswith("_period")), 0.0)
+    if effect in _SLOW and period * REPEATED > stroke:
+        return _SLOW[effect]
+    reach, part = values.get("stop_reach", 0.0), values.get("stop_part", 1.0)
+    if effect == "end_stop" and reach > (ABRUPT if part > FAINT else 0.5 * ABRUPT) * stroke:
+        return _SOFT
+    if effect == "compliance" and values.get("damping_ratio", 0.0) >= SWINGING:
+        return _CREEPING
+    return None
 
 
 # Sizes without a sign: where other terms of the model could stand in for all of it, only the most
@@ -90,9 +126,10 @@ _SIZES = ("stribeck_force", "amplitude", "presliding_force", "backlash_force", "
 def _words(name: str, estimate: Estimate) -> str:
     """A value in words; of a size that may be nil the most that it may be."""
     most = float(estimate.value) + 2 * float(estimate.standard_error)
-    nil = abs(float(estimate.value)) <= 2 * float(estimate.standard_error) < math.inf
-    if name.startswith(_SIZES) and nil:
+    if name.startswith(_SIZES) and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
+    if name == "pitch" or name.endswith("_period"):
+        return quantity(estimate) + turns(estimate)
     return quantity(estimate)
 
 
@@ -107,6 +144,41 @@ def mismatch_sentence(moved, share: float) -> str:
             value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
             parts.append(f"{name} is {value} {'more' if m.value > 0 else 'less'}")
     return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
+
+
+_SPOKEN = {
+    "coulomb": "Coulomb friction",
+    "viscous": "viscous friction",
+    "stribeck_force": "the Stribeck bump",
+    "stribeck_velocity": "the Stribeck velocity",
+    "offset": "the constant force",
+}
+_SIDES = {"+": " forwards", "-": " backwards", "": ""}
+
+
+def parameter(name: str) -> str:
+    """A parameter in words: "Coulomb friction forwards"."""
+    side = name[-1] if name.endswith(("+", "-")) else ""
+    stem = name.removesuffix(side)
+    return _SPOKEN.get(stem, stem.replace("_", " ")) + _SIDES[side]
+
+
+def changed_sentence(moved, share: float, other: str) -> str:
+    """Values that another recording had otherwise, as a sentence; ± of the change, 95 %."""
+    parts = []
+    for name, m in moved.items():
+        error = math.hypot(float(m.standard_error), m.before_error)
+        half = 2 * error
+        digits = max(0, 1 - math.floor(math.log10(half))) if 0 < half < math.inf else 3
+        unit = f" {m.unit}" if m.unit not in ("", "1") else ""
+        way = "rose" if m.value > m.before else "fell"
+        part = f"{parameter(name)} {way} from {m.before:.{digits}f} to {m.value:.{digits}f}{unit}"
+        if 0 < half < math.inf:
+            part += f" (± {half:.{digits}f})"
+        parts.append(part)
+    text = ", ".join(parts)
+    text = text[:1].upper() + text[1:]
+    return f"{text} since {other or 'the other recording'}; {share:.0%} of the difference."
 
 
 class _Gaps(dict):

@@ -11,9 +11,10 @@ from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch
+from .bins import unit
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
-from .curves import curves, unit
+from .curves import curves
 from .doubts import NOT_BETTER, accelerates, doubts, not_better
 from .errors import document, filtered_errors
 from .evidence import Evidence
@@ -22,10 +23,11 @@ from .figures import Figures
 from .improvement import Improved, elsewhere
 from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
+from .partial_residuals import moved as moved_curve, partial_residuals
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fast, fit
-from .sentences import mismatch_sentence, sentence
+from .sentences import changed_sentence, mismatch_sentence, sentence
 from .views import estimated
 
 
@@ -49,34 +51,40 @@ def tell(
     first, found, rest = better.first, better.found, better.rest
     before, after = _places(asked, better, wrong, seed)
     findings = _findings(found, asked, rest, first)
+    shown = partial_residuals(asked, better)
     standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
     values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
     if wrong is not None:
-        findings = [_moved(values, wrong, found, first, asked), *findings]
+        findings = [_moved(values, wrong, known, found, first, asked), *findings]
+        shown = [moved_curve(asked, better, wrong), *shown]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
     drawn = curves(
         before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
     )
+    told = sorted(zip(findings, shown, strict=True), key=lambda pair: -pair[0].share)
+    findings, drawn["findings"] = [each for each, _ in told], [picture for _, picture in told]
     filtered = filtered_errors(asked, first, *rest)
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(asked, better, units)]
-    verdict = _verdict(findings, before, after, _rough(filtered, shares), standing)
+    much = rough(filtered, shares) and not known.rough
+    new, later = ([p for p in some if p.coordinate not in known.left] for some in (before, after))
+    verdict = _verdict(findings, new, later, much, standing)
     errors = document(asked, better, filtered, models[1], figures)
     remarks = [*remarks, *_elsewhere(errors)]
     return Explanation(
-        verdict=_doubted(verdict, remarks),
-        where=_everywhere([_where(place, units) for place in before], findings, first),
-        findings=sorted(findings, key=lambda finding: -finding.share),
+        verdict=_doubted(verdict, remarks, known.fit is not None),
+        where=_everywhere([_where(place, units, known.left) for place in before], findings, first),
+        findings=findings,
         fit=errors,
         not_visible=_not_visible(found, units, better.gone),
         model=models[1],
         baseline=models[0],
         baseline_name=known.name,
         baseline_parameters=values,
-        recording=_facts(recording),
+        recording=facts(recording),
         curves=drawn,
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if asked.held is None else elsewhere(found, rest, recording.units),
@@ -87,14 +95,16 @@ def _places(asked: Question, better: Improved, wrong: Mismatch | None, seed: int
     """Where the baseline's residual has structure, and where that of the findings has."""
     first, evidence = better.first, asked.evidence
     force = float(np.sqrt(np.mean(evidence.force**2)))
-    before = _shown(locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force)
+    before = shown_places(
+        locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force
+    )
     before = _through_wide(before, first, asked.wide, seed)
     before = _lasting(before, first, asked)
     if not better.found.taken and wrong is None:
         return before, []
     where, left = better.rest
     seen = with_predictions(where.evidence, left.last)
-    after = _shown(locate(seen, left.last, seed), LATER_SHARE, force)
+    after = shown_places(locate(seen, left.last, seed), LATER_SHARE, force)
     after = _through_wide(after, left.last, where.wide, seed)
     return before, _lasting(after, left.last, where)
 
@@ -135,14 +145,19 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
     return [Remark("holdout_differs", text, False)]
 
 
-def _doubted(verdict: str, remarks: Sequence[Remark]) -> str:
-    """A verdict that says no more than the remarks allow."""
+def _doubted(verdict: str, remarks: Sequence[Remark], compared: bool) -> str:
+    """A verdict that says no more than the remarks allow.
+
+    `compared`: with another recording, in which what has no name may be as well.
+    """
     names = {remark.name for remark in remarks}
     doubtful = any(remark.severe for remark in remarks)
     if verdict == "explained" and doubtful:
         return "partly_explained"
     return (
-        "unexplained" if verdict == "consistent" and (doubtful or NOT_BETTER in names) else verdict
+        "unexplained"
+        if verdict == "consistent" and (doubtful or (NOT_BETTER in names and not compared))
+        else verdict
     )
 
 
@@ -157,23 +172,31 @@ def _freed(now: Fit, wrong: Mismatch | None) -> Fit:
     return now._replace(columns=columns, slopes=slopes)
 
 
-def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -> Finding:
+def _moved(
+    values, wrong: Mismatch, known: Baseline, found: Named, first: Fit, asked: Question
+) -> Finding:
     names = [p.name for p in (*found.base.terms[0].affine, *found.base.terms[0].nonlinear)]
-    moved = {
-        names[i]: Moved(before, values[names[i]].value, *values[names[i]][1:3])
-        for i, before in wrong.moved.items()
-    }
+    errors = np.zeros(len(names)) if known.errors is None else known.errors
+    moved = {}
+    for i, before in wrong.moved.items():
+        now = values[names[i]]
+        if i not in wrong.within:
+            moved[names[i]] = Moved(
+                before, now.value, now.standard_error, now.unit, float(errors[i])
+            )
     held = None
     if asked.held is not None:
         held = verification.share(first, found.base, first, asked.held)
     text = mismatch_sentence(moved, wrong.share)
+    if known.fit is not None:
+        text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
     equation = "θ = θ₀ + Δθ"
     return Finding(
         "parameter_mismatch", equation, text, (), "", moved, wrong.share, held, wrong.p_value
     )
 
 
-def _shown(places: list[Place], least: float, force: float) -> list[Place]:
+def shown_places(places: list[Place], least: float, force: float) -> list[Place]:
     """The places that are believed: by chance, by share, and beyond the force's linearity."""
     floor = LINEARITY * force
     return [p for p in places if p.p_value <= LEVEL and p.share >= least and p.size >= floor]
@@ -222,7 +245,7 @@ ROUGH = 4.0
 HALF_ROUGH, HALF = 1.25, 0.5
 
 
-def _rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
+def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or much of it all.
 
     What is named (`shares` by effect) has to explain the held-out recording as well. What belongs
@@ -285,7 +308,8 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
             parameters = _dated(parameters, asked.evidence)
         share, held = _shares(found, asked, rest, first, number)
         rivals = taken.rivals
-        text = sentence(effect.name, parameters, share, rivals)
+        told = parameters | _reach(parameters, asked.evidence)
+        text = sentence(effect.name, told, share, rivals, _stroke(asked.evidence))
         if taken.rephased:
             text += (
                 " On the held-out recording it has the same period and amplitude at another "
@@ -306,7 +330,28 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
                 taken.p_value,
             )
         )
-    return sorted(findings, key=lambda finding: -finding.share)
+    return findings
+
+
+def _stroke(evidence: Evidence) -> float:
+    """The range of the position."""
+    limits = evidence.limits
+    return float(limits.high - limits.low)
+
+
+def _reach(parameters: Mapping[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
+    """How far the axis goes into a stop, and its force there in parts of the usual force."""
+    limits, found = evidence.limits, {}
+    for name, estimate in parameters.items():
+        if name.endswith("stop_position"):
+            lower = name.startswith("lower")
+            end = limits.low if lower else limits.high
+            far = abs(float(end) - float(estimate.value))
+            found["stop_reach"] = Estimate(np.float64(far), np.float64(0.0), estimate.unit)
+            stiffness = parameters[name.replace("position", "stiffness")].value
+            part = far * abs(float(stiffness)) / np.sqrt(np.mean(evidence.force**2))
+            found["stop_part"] = Estimate(np.float64(part), np.float64(0.0), "1")
+    return found
 
 
 def _shares(
@@ -362,7 +407,9 @@ def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list
     return places
 
 
-def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
+def _where(
+    place: Place, units: Mapping[str, str], shared: frozenset[str] = frozenset()
+) -> dict[str, Any]:
     detail, its = "", unit(place.coordinate, units)
     if place.coordinate == "position_lines":
         detail = f"period {1 / place.peak:.4g} {its}"
@@ -375,6 +422,8 @@ def _where(place: Place, units: Mapping[str, str]) -> dict[str, Any]:
         at, height = place.curve
         peak = int(np.argmax(np.abs(height)))
         detail = f"strongest at {at[peak]:.3g} {its}".rstrip()
+    if place.coordinate in shared:
+        detail += ", as in the other recording"
     return {
         "coordinate": place.coordinate.removesuffix("_lines"),
         "share": place.share,
@@ -393,12 +442,14 @@ def _not_visible(found: Named, units, gone: Sequence[str]) -> list[dict[str, Any
     ]
 
 
-def _facts(recording: Recording) -> dict[str, Any]:
+def facts(recording: Recording) -> dict[str, Any]:
+    """File, samples, duration, s, and rate, Hz, of a recording."""
     time, mask = np.asarray(recording.time), np.asarray(recording.mask)
     steps = np.diff(time[mask])
     steps = steps[steps > 0]
     return {
         "file": recording.source,
+        "sha256": recording.sha256 or None,
         "samples": int(mask.sum()),
         "duration": float(steps.sum()),
         "sample_rate": float(1 / np.median(steps)),

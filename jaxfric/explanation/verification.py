@@ -59,6 +59,11 @@ def _there(
     return left, alphas
 
 
+def at_phase(now: Fit, evidence: Evidence, rephased: frozenset[int]) -> Fit:
+    """A fit with the waves of those numbers at their phase on another recording."""
+    return now._replace(alphas=tuple(_there(now, evidence, rephased, frozenset())[1]))
+
+
 def wavelike(now: Fit, number: int) -> bool:
     """Whether a term is a wave over position, whose phase belongs to the encoder's zero."""
     term = now.terms[number]

@@ -5,13 +5,14 @@ import re
 import numpy as np
 
 from ..models import Model, require
-from . import c, cost, modelica, mujoco, table, urdf
+from . import c, cost, modelica, mujoco, st, table, urdf
 from .cost import Range
 from .outcome import Exported
+from .parts import divisors
 
-_EXACT = {"c": c.export, "modelica": modelica.export}
+_EXACT = {"c": c.export, "modelica": modelica.export, "st": st.export}
 _RANGED = {"mujoco": mujoco.export, "urdf": urdf.export, "table": table.export}
-TARGETS = ("c", "modelica", "mujoco", "urdf", "table")
+TARGETS = ("c", "st", "modelica", "mujoco", "urdf", "table")
 
 
 def export(
@@ -68,5 +69,10 @@ def _written(model: Model, target: str, name: str, speed, position) -> Exported:
     if speed is not None or position is not None:
         raise ValueError(
             f"{target} is exact everywhere and takes no range: leave out --speed and --position."
+        )
+    if zero := divisors(model):
+        raise ValueError(
+            f"{', '.join(zero)} is 0, and the force divides by it: identify anew, or leave out "
+            "the term."
         )
     return _EXACT[target](model, name)

@@ -1,5 +1,6 @@
 """A model taken apart: its summands with their parameters, and their force as text."""
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from ..terms.presliding import AbstractMemory
 from ..terms.time import AbstractModulated
 from ..units import spell
 from .laws import COLUMNS, FACTORS
-from .syntax import Syntax, identifier
+from .syntax import C, Syntax, identifier
 
 SAMPLED = {"position", "velocity", "time", "acceleration"}
 
@@ -144,6 +145,23 @@ def _sides(syntax, sided: Sequence[tuple[AbstractTerm, str]], affine, nonlinear)
         inner = _lines(syntax, term, own, searched)
         found += [line._replace(side=side or line.side) for line in inner]
     return tuple(found)
+
+
+def divisors(model: Model) -> list[str]:
+    """The parameters by which the force divides and that are zero."""
+    found = []
+    for part in parts(model):
+        try:
+            text = " ".join(line.column for line in lines(C, part))
+        except ValueError:  # it has no text that could divide
+            continue
+        below = set(re.findall(r"/ (\w+)", text))
+        found += [
+            name
+            for name in part.nonlinear
+            if identifier(name) in below and float(model.parameters[name]) == 0
+        ]
+    return found
 
 
 def constants(model: Model) -> list[tuple[str, float, str]]:

@@ -19,7 +19,8 @@ class Options(NamedTuple):
     """All that the rows of a fleet depend on, beside its files.
 
     `model`, a name; `projection`, "auto", "closed-windows" or "weak-form"; `bounds` of nonlinear
-    parameters; `columns`, `scale`, `units`, `period` and `repair` as [`jaxfric.read`][] takes them.
+    parameters; `columns`, `scale`, `units`, `period`, `repair` and `rate` as [`jaxfric.read`][]
+    takes them.
     """
 
     model: str = "gaussian"
@@ -30,11 +31,12 @@ class Options(NamedTuple):
     units: Mapping[str, str] = {}
     period: Mapping[str, float] = {}
     repair: bool = True
+    rate: float | None = None
 
     @property
     def reading(self) -> dict[str, Any]:
         """The arguments of [`jaxfric.read`][]."""
-        names = ("columns", "scale", "units", "period", "repair")
+        names = ("columns", "scale", "units", "period", "repair", "rate")
         return {name: getattr(self, name) for name in names}
 
 

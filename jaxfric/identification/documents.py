@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..data.printable import json_text
+from ..data.provenance import versions
 from ..data.recording import Recording
 from ..data.summary import facts
 from ..models import name_of
@@ -43,7 +44,18 @@ def identification(
         "diagnosis": found.diagnosis,
         "force_error": float(found.force_error),
         "warnings": [remark.to_dict() for remark in found.remarks],
+        "versions": versions(),
     }
+
+
+def saved(model: Any, *recordings: Recording | None) -> dict[str, Any]:
+    """A model as plain data, with what it was made from and by."""
+    files = [
+        {"file": each.source, "sha256": each.sha256 or None}
+        for each in recordings
+        if each is not None
+    ]
+    return model.to_dict() | {"made_from": files, "versions": versions()}
 
 
 def open_ends(found: Any) -> dict[str, float]:

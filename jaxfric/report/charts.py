@@ -1,128 +1,192 @@
-"""Interactive pictures of an explanation, as pieces of HTML that plotly's script brings to life."""
+"""What the page's pictures show, as plain data that its script draws by uPlot."""
 
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
 
-BEFORE, AFTER, MEASURED = "#c4570a", "#0b5fa5", "#9aa3ab"
+# Digits of what is drawn: a ten-thousandth of the range is less than a dot.
+DIGITS = 5
 Curves = Mapping[str, Any]
+Chart = dict[str, Any]
 
 
-def library():
-    """The modules `graph_objects` and `subplots` of plotly; raises `ValueError` without it."""
-    try:
-        from plotly import graph_objects, subplots
-    except ImportError as error:
-        raise ValueError('The page needs plotly: pip install "jaxfric[report]".') from error
-    return graph_objects, subplots
+def chart(
+    title: str, x: tuple[str, str], y: tuple[str, str], at: Sequence[float], series, height=260
+) -> Chart:
+    """A picture: `x` and `y` as label and unit, and series that [`line`][] and others make."""
+    drawn = [each for each in series if each]
+    columns = [column for each in drawn for column in each.pop("columns")]
+    x_unit, x_scale = _prefixed(x[1], [at])
+    y_unit, y_scale = _prefixed(y[1], columns)
+    return {
+        "title": title,
+        "x": {"label": _label(x[0], x_unit), "unit": x_unit},
+        "y": {"label": _label(y[0], y_unit), "unit": y_unit},
+        "height": height,
+        "series": drawn,
+        "data": [_short(at, x_scale), *(_short(column, y_scale) for column in columns)],
+    }
 
 
-def script() -> str:
-    """Plotly's own script, so that the page needs no network."""
-    library()
-    from plotly.offline import get_plotlyjs
-
-    return f"<script>{get_plotlyjs()}</script>"
+# What numbers read better in, where the largest is below a twentieth of the unit.
+_SMALLER = {"m": "mm", "m/s": "mm/s", "s": "ms", "N·m": "mN·m", "Nm": "mNm", "A": "mA"}
 
 
-def maps(entries: Sequence[Curves], force: str) -> str:
-    """The mean residual over each coordinate, before and after, with its standard error."""
-    objects, subplots = library()
-    figure = subplots.make_subplots(
-        rows=(len(entries) + 1) // 2, cols=min(2, len(entries)), vertical_spacing=_gap(len(entries))
+def _prefixed(unit: str, columns: Sequence[Sequence[float | None]]) -> tuple[str, float]:
+    """The unit of an axis and the factor to it."""
+    greatest = max((abs(v) for column in columns for v in column if v is not None), default=1.0)
+    return (_SMALLER[unit], 1e3) if unit in _SMALLER and greatest < 0.05 else (unit, 1.0)
+
+
+def line(key: str, label: str, values: Sequence[float] | None, width: float = 1.6) -> Any:
+    """A line; `None` where there are no values. `key`: measured, before, after."""
+    if values is None:
+        return None
+    return {
+        "kind": "line",
+        "key": key,
+        "label": label,
+        "width": width,
+        "columns": [list(values)],
+    }
+
+
+def points(key: str, label: str, values, error=None) -> Any:
+    """Points with bars of two standard errors to either side."""
+    if values is None:
+        return None
+    columns = [list(values)]
+    if error is not None:
+        for side in (-2.0, 2.0):
+            ends = (_moved(v, e, side) for v, e in zip(values, error, strict=True))
+            columns.append(list(ends))
+    return {
+        "kind": "points",
+        "key": key,
+        "label": label,
+        "bars": error is not None,
+        "columns": columns,
+    }
+
+
+def band(key: str, label: str, low, high) -> Any:
+    """A band between two lines."""
+    if low is None or high is None:
+        return None
+    return {"kind": "band", "key": key, "label": label, "columns": [list(low), list(high)]}
+
+
+def mismatch(entry: Curves, force: str, added: bool = True) -> Chart:
+    """What the baseline leaves over a coordinate, and what the improved model leaves there."""
+    before, after = entry["before"], entry.get("after")
+    error = entry.get("before_error", entry.get("error"))
+    gained = None
+    if added and after is not None:
+        gained = [_less(b, a) for b, a in zip(before, after, strict=True)]
+    return chart(
+        f"Mismatch over {entry['coordinate']}",
+        (entry["coordinate"], entry.get("unit") or ""),
+        ("measured less model", force),
+        entry["at"],
+        [
+            line("left", "what the findings add", gained, 2.2),
+            points("before", "measured − baseline, ± 95 %", before, error),
+            points("after", "measured − improved model", after) if after else None,
+        ],
+        320,
     )
-    for i, entry in enumerate(entries):
-        place = {"row": i // 2 + 1, "col": i % 2 + 1}
-        for key, colour in (("before", BEFORE), ("after", AFTER)):
-            if not entry.get(key):
-                continue
-            error = entry.get("error") if key == "before" else None
-            bars = {"type": "data", "array": error, "thickness": 1, "width": 0} if error else None
-            line = _line(objects, entry["at"], entry[key], key, colour, i == 0, error_y=bars)
-            figure.add_trace(line, **place)
-        figure.add_hline(y=0, line={"color": "#888", "width": 1, "dash": "dot"}, **place)
-        figure.update_xaxes(title_text=_label(entry["coordinate"], entry.get("unit")), **place)
-        figure.update_yaxes(title_text=_label("residual", force) if i % 2 == 0 else "", **place)
-    return _html(figure, 60 + 260 * ((len(entries) + 1) // 2))
 
 
-def _gap(count: int) -> float:
-    """Room for the axis title between the rows, as a share of the height."""
-    return 0.0 if count <= 2 else 0.3 / ((count + 1) // 2)
+def finding(entry: Curves, force: str) -> Chart:
+    """One finding over its own coordinate: measured, and its law with a 95 % band."""
+    return chart(
+        f"Over {entry['coordinate']}",
+        (entry["coordinate"], entry.get("unit") or ""),
+        ("force of this effect", force),
+        entry["at"],
+        [
+            band("after", "95 % band", entry.get("low"), entry.get("high")),
+            points(
+                "measured", "measured less all else, ± 95 %", entry["measured"], entry.get("error")
+            ),
+            line("after", "law", entry["law"], 2.0),
+        ],
+    )
 
 
-def in_time(curves: Curves, force: str) -> str:
+def in_time(curves: Curves, force: str) -> list[Chart]:
     """Measured and predicted force over time, and below what is left of it."""
-    objects, subplots = library()
-    figure = subplots.make_subplots(
-        rows=2, cols=1, shared_xaxes=True, row_heights=[0.6, 0.4], vertical_spacing=0.06
+    time, measured = curves["time"], curves["measured"]
+    whole = chart(
+        "Force over time",
+        ("time without interruptions", "s"),
+        ("force", force),
+        time,
+        [line("measured", "measured", measured, 2.4), *_models(curves)],
     )
-    time, measured = list(curves["time"]), list(curves["measured"])
-    figure.add_trace(_line(objects, time, measured, "measured", MEASURED, True), row=1, col=1)
-    for key, colour in (("before", BEFORE), ("after", AFTER)):
-        if not curves.get(key):
-            continue
-        predicted = list(curves[key])
-        left = [_difference(u, p) for u, p in zip(measured, predicted, strict=True)]
-        figure.add_trace(_line(objects, time, predicted, key, colour, True), row=1, col=1)
-        figure.add_trace(_line(objects, time, left, key, colour, False), row=2, col=1)
-    figure.update_yaxes(title_text=_label("force", force), row=1, col=1)
-    figure.update_yaxes(title_text=_label("residual", force), row=2, col=1)
-    figure.update_xaxes(title_text=_label("time", "s"), row=2, col=1)
-    return _html(figure, 460)
+    left = {
+        key: [_less(u, p) for u, p in zip(measured, curves[key], strict=True)]
+        for key in ("before", "after")
+        if curves.get(key)
+    }
+    rest = chart(
+        "What is left of it",
+        ("time without interruptions", "s"),
+        ("residual", force),
+        time,
+        _models(left),
+        200,
+    )
+    return [whole, rest]
 
 
-def _difference(first: float | None, second: float | None) -> float | None:
+def friction(curves: Curves, force: str, position: str) -> Chart:
+    """The friction curve of the improved model over the speeds that were seen."""
+    at = [*curves["velocity"], 0.0, *(curves.get("at") or ())]
+    order = sorted(range(len(at)), key=lambda i: at[i])
+    modelled, seen = len(curves["velocity"]) + 1, len(curves.get("at") or ())
+
+    def spread(values, before: int, after: int):
+        if not values:
+            return None
+        whole = [None] * before + list(values) + [None] * after
+        return [whole[i] for i in order]
+
+    names = ("measured", "error")
+    measured, error = (spread(curves.get(name), modelled, 0) for name in names)
+    picture = chart(
+        "Friction over velocity",
+        ("velocity", f"{position}/s"),
+        ("friction force", force),
+        [at[i] for i in order],
+        [
+            points("measured", "measured less all else, ± 95 %", measured, error),
+            line("before", "baseline", spread(curves.get("before"), 0, seen + 1)),
+            line("after", "improved model", spread(curves.get("after"), 0, seen + 1), 2.0),
+        ],
+        300,
+    )
+    # Curve and points stand at different speeds: a line runs through, but never across rest.
+    return picture | {"through": True}
+
+
+def _models(curves: Curves) -> list[Any]:
+    return [
+        line("before", "baseline", curves.get("before"), 1.0),
+        line("after", "improved model", curves.get("after"), 1.0),
+    ]
+
+
+def _label(quantity: str, unit: str) -> str:
+    return quantity.replace("_", " ") + (f" [{unit}]" if unit else "")
+
+
+def _moved(value, error, side: float):
+    return None if value is None or error is None else value + side * error
+
+
+def _less(first: float | None, second: float | None) -> float | None:
     return None if first is None or second is None else first - second
 
 
-def friction(curves: Curves, force: str, position: str) -> str:
-    """The friction curve before and after; the jump at zero velocity stays a gap."""
-    objects, _ = library()
-    figure = objects.Figure()
-    for key, colour in (("before", BEFORE), ("after", AFTER)):
-        if curves.get(key):
-            for side in (-1, 1):
-                at = [i for i, v in enumerate(curves["velocity"]) if side * v > 0]
-                x, y = ([curves[name][i] for i in at] for name in ("velocity", key))
-                figure.add_trace(_line(objects, x, y, key, colour, side > 0))
-    figure.update_xaxes(title_text=_label("velocity", f"{position}/s"))
-    figure.update_yaxes(title_text=_label("friction", force))
-    return _html(figure, 380)
-
-
-def _line(objects, x, y, name, colour, legend, **more):
-    return objects.Scatter(
-        x=list(x),
-        y=list(y),
-        name=name,
-        legendgroup=name,
-        mode="lines",
-        line={"color": colour, "width": 1.5},
-        showlegend=legend,
-        **{key: value for key, value in more.items() if value is not None},
-    )
-
-
-def _label(quantity: str, unit: str | None) -> str:
-    text = escape(quantity.replace("_", " "))
-    return f"{text} ({escape(unit)})" if unit else text
-
-
-def _html(figure, height: int) -> str:
-    figure.update_layout(
-        template="plotly_white",
-        height=height,
-        margin={"l": 70, "r": 15, "t": 35, "b": 50},
-        font={"family": "system-ui, sans-serif", "size": 12, "color": "#222"},
-        legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
-    )
-    config = {
-        "displaylogo": False,
-        "displayModeBar": "hover",
-        "responsive": True,
-        # A recording is its owner's: no button that uploads it.
-        "modeBarButtonsToRemove": ["sendChartToCloud", "sendDataToCloud"],
-        "plotlyServerURL": "",
-    }
-    return figure.to_html(full_html=False, include_plotlyjs=False, config=config)
+def _short(values, scale: float = 1.0) -> list[float | None]:
+    return [None if v is None or v != v else float(f"{scale * v:.{DIGITS}g}") for v in values]

@@ -2,304 +2,186 @@
 
 import math
 from collections.abc import Mapping
-from html import escape
+from importlib import resources
+from pathlib import PurePath
 from typing import Any
 
-from ..looks.html import table as _table
-from ..terms.effects import EFFECTS
-from . import charts
+from ..models import Model
+from . import advice, charts, content, equations, handover
+from .advice import spoken
 
-# Half a 95 % interval in standard errors, as in the findings' sentences.
-HALF_WIDTH = 2.0
+# Pictures of where the baseline errs that no finding shows already.
+MAPS = 2
 _NONE = "–"
 _VERDICTS = {
-    "consistent": ("Consistent", "#1b7f4b", "Nothing is missing beyond the noise."),
-    "explained": ("Explained", "#0b5fa5", "The named physics accounts for the mismatch."),
-    "partly_explained": (
-        "Partly explained",
-        "#b26a00",
-        "Named physics accounts for a part; structure is left, or terms overlap.",
-    ),
-    "unexplained": (
-        "Unexplained",
-        "#b3261e",
-        "Something is missing that no effect of the library accounts for.",
-    ),
+    "consistent": "Consistent",
+    "explained": "Explained",
+    "partly_explained": "Partly explained",
+    "unexplained": "Unexplained",
 }
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff;
-  max-width: 62rem; margin: 0 auto; padding: 1.5rem; }
-h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }
-.file { color: #555; overflow-wrap: anywhere; margin: 0 0 1rem; }
-.verdict { border-left: .5rem solid var(--tone); background: #f5f6f7; padding: .8rem 1rem; }
-.verdict strong { color: var(--tone); }
-.warnings { border-left: .5rem solid #b26a00; background: #f5f6f7; margin: .6rem 0;
-  padding: .6rem 1rem .6rem 2rem; }
-.numbers { display: flex; flex-wrap: wrap; gap: .8rem 2.5rem; margin: 1rem 0; padding: 0; }
-.numbers div { min-width: 9rem; } .numbers dt { color: #555; font-size: .85rem; }
-.numbers dd { margin: 0; font-size: 1.2rem; font-variant-numeric: tabular-nums; }
-table { border-collapse: collapse; margin: .4rem 0 1rem; }
-th, td { text-align: left; vertical-align: top; padding: .35rem 1.5rem .35rem 0;
-  border-bottom: 1px solid #ddd; }
-th { font-weight: 600; font-size: .85rem; color: #444; border-bottom-color: #888; }
-td.number, th.number { text-align: right; white-space: nowrap;
-  font-variant-numeric: tabular-nums; }
-.note { color: #555; font-size: .9rem; margin: .2rem 0 .6rem; } code { font-size: .9em; }
-@media screen { section { overflow-x: auto; } }
-@media print { body { max-width: none; padding: 0; font-size: 11pt; }
-  section { break-inside: avoid; } h2 { break-after: avoid; } .modebar { display: none; }
-  .verdict { print-color-adjust: exact; -webkit-print-color-adjust: exact; } }
-"""
 
 
-def render(document: Mapping[str, Any], pictures: Mapping[str, Any] | None = None) -> str:
+def library():
+    """The module `jinja2`; raises `ValueError` without it."""
+    try:
+        import jinja2
+    except ImportError as error:
+        raise ValueError('The page needs jinja2: pip install "jaxfric[report]".') from error
+    return jinja2
+
+
+def render(
+    document: Mapping[str, Any],
+    pictures: Mapping[str, Any] | None = None,
+    command: str = "",
+    date: str = "",
+) -> str:
     """The page of an explanation, HTML that loads nothing from elsewhere.
 
     **Arguments:** `document`, an explanation (schema `jaxfric.explanation/1`); `pictures`, plain
-    lists to draw from, any of them absent: `map`, a list of `coordinate`, `unit`, `at`, `before`,
-    `after`, `error` (binned mean residual); `time` and `holdout`, each `time`, `measured`,
-    `before`, `after` (s; forces); `friction`, `velocity`, `before`, `after`; `units`, the names
-    of `force` and `position`.
+    lists to draw from (`Explanation.curves`), any of them absent: `findings`, in the document's
+    order, and `map`, lists over a coordinate; `time` and `holdout`, each `time`, `measured`,
+    `before`, `after`; `friction`, `velocity`, `before`, `after`; `units`, the names of `force`
+    and `position`; `command` and `date`, that made it.
 
-    **Raises:** `ValueError` if it is another document, or pictures are given without plotly.
+    **Raises:** `ValueError` if it is another document, or without jinja2.
     """
     schema = document.get("schema")
     if schema != "jaxfric.explanation/1":
         raise ValueError(f"Not an explanation: schema is {schema!r}, not 'jaxfric.explanation/1'.")
-    drawn = _pictures(document, pictures or {})
-    file = document.get("recording", {}).get("file") or "recording"
-    sections = [
-        _findings(document),
-        _separation(document),
-        _where(document, drawn.get("map", "")),
-        _section("Before and after in time", drawn.get("time", "")),
-        _section(
-            "Held-out recording",
-            drawn.get("holdout", ""),
-            "Nothing was refitted to this recording.",
-        ),
-        _section("Friction curve", drawn.get("friction", "")),
-        _parameters(document),
-        _not_visible(document),
-        _recording(document),
-    ]
-    body = "\n".join([_head(document, file), *filter(None, sections)])
-    return f"""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{escape(file)} – explained by jaxfric</title>
-<style>{_STYLE}</style>
-{charts.script() if drawn else ""}
-</head>
-<body>
-{body}
-</body>
-</html>
-"""
+    jinja2 = library()
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    curves = pictures or {}
+    context = _context(document, curves) | _reproduce(document, command, date)
+    page = {
+        "style": _asset("page.css"),
+        "chart_style": _asset("uPlot.min.css"),
+        "library": _asset("uPlot.iife.min.js"),
+        "script": _asset("page.js"),
+    }
+    from markupsafe import Markup  # jinja2 stands on it
+
+    return environment.from_string(_asset("page.html")).render(
+        **context, **{name: Markup(text) for name, text in page.items()}
+    )
 
 
-def _pictures(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str, str]:
-    """The pictures that there are curves for, as HTML, by name."""
-    units = _units(document) | (curves.get("units") or {})
+def _asset(name: str) -> str:
+    return (resources.files(__package__) / "assets" / name).read_text(encoding="utf-8")
+
+
+def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything that the template shows, as text and plain data."""
+    units = _units(document) | dict(curves.get("units") or {})
+    drawn = _pictures(document, curves, units)
+    model = _model(document)
+    headline = advice.headline(document)
+    warned = [each["text"] for each in document.get("warnings") or ()]
+    unseen = [n for n, v in model.parameters.items() if math.isnan(float(v))] if model else []
+    terms = equations.rows(model) if model else []
+    return {
+        "name": PurePath(document.get("recording", {}).get("file") or "recording").name,
+        "baseline": (document.get("baseline") or {}).get("name"),
+        "verdict": document["verdict"] if document["verdict"] in _VERDICTS else "",
+        "verdict_name": _VERDICTS.get(document["verdict"], spoken(document["verdict"])),
+        "headline": headline,
+        "warnings": [text for text in dict.fromkeys(warned) if text not in headline],
+        "errors": content.errors(document.get("fit") or {}),
+        "next": advice.steps(document),
+        "cards": content.cards(document, curves, units, terms),
+        "places": content.places(document),
+        "places_note": content.places_note(document),
+        "terms": terms,
+        "unseen": ", ".join(unseen),
+        "parameters": content.parameters(document),
+        "units": units,
+        "code": handover.code(model) if model else [],
+        "hidden": content.hidden(document),
+        "definitions": content.definitions(document.get("fit") or {}),
+        **drawn,
+        "drawn": any(drawn.values()),
+    }
+
+
+def _pictures(document, curves, units: Mapping[str, str]) -> dict[str, Any]:
+    """The pictures that there are curves for, each once."""
+    if not document.get("findings"):  # the improved model is the baseline
+        curves = _unchanged(curves)
     force, position = units["force"], units["position"]
-    drawn = {}
-    if curves.get("map"):
-        drawn["map"] = charts.maps(curves["map"], force)
-    for name in ("time", "holdout"):
-        if curves.get(name):
-            drawn[name] = charts.in_time(curves[name], force)
-    if curves.get("friction"):
-        drawn["friction"] = charts.friction(curves["friction"], force, position)
-    return drawn
+    own, places = list(curves.get("findings") or ()), list(curves.get("map") or ())
+    time, held = curves.get("time"), curves.get("holdout")
+    friction = curves.get("friction")
+    friction = charts.friction(friction, force, position) if friction else None
+    hero, hero_place = None, None
+    if own:
+        hero = charts.mismatch(own[0], force)
+    elif places:
+        hero_place = places.pop(0)
+        hero = charts.mismatch(hero_place, force, added=False)
+    elif friction:
+        hero, friction = friction, None
+    shown = {_stem(entry) for entry in own or ([hero_place] if hero_place else [])}
+    rest = {_stem(place): place for place in reversed(places) if _stem(place) not in shown}
+    velocity = (curves.get("friction") or {}).get("velocity") or [-1.0, 1.0]
+    return {
+        "hero": hero,
+        "maps": [
+            charts.mismatch(p, force, added=False) for p in list(reversed(rest.values()))[:MAPS]
+        ],
+        "time": charts.in_time(time, force) if time else None,
+        "holdout": charts.in_time(held, force)[1] if held else None,
+        "friction": friction,
+        "one_sided": min(velocity) > 0 or max(velocity) < 0,
+    }
+
+
+def _unchanged(curves: Mapping[str, Any]) -> dict[str, Any]:
+    """The curves without those of an improved model."""
+
+    def alone(entry):
+        return entry and {**entry, "after": None}
+
+    shown = {name: alone(curves.get(name)) for name in ("time", "holdout", "friction")}
+    return {
+        **curves,
+        **shown,
+        "findings": None,
+        "map": [alone(each) for each in curves.get("map") or ()],
+    }
+
+
+def _stem(entry: Mapping[str, Any]) -> str:
+    """A coordinate without what it is folded at or in step with."""
+    return entry["coordinate"].partition(",")[0].partition(" by ")[0]
 
 
 def _units(document: Mapping[str, Any]) -> dict[str, str]:
     return {"force": "N", "position": "m"} | (document.get("model") or {}).get("units", {})
 
 
-def _head(document: Mapping[str, Any], file: str) -> str:
-    name, tone, sentence = _VERDICTS.get(document["verdict"], (document["verdict"], "#444", ""))
-    sentence = document.get("summary") or sentence
-    baseline = (document.get("baseline") or {}).get("name")
-    against = f" · baseline {escape(baseline)}" if baseline else ""
-    return f"""<h1>What the model leaves out</h1>
-<p class="file">{escape(file)}{against}</p>
-<div class="verdict" style="--tone: {tone}">
-<strong>{escape(name)}.</strong> {escape(sentence)}
-</div>
-{_warnings(document, sentence)}{_numbers(document.get("fit") or {})}"""
+def _model(document: Mapping[str, Any]) -> Model | None:
+    found = document.get("model") or {}
+    return Model.from_dict(found) if "term" in found else None
 
 
-def _warnings(document: Mapping[str, Any], said: str) -> str:
-    """What makes the answer doubtful, but for what the verdict's sentence says already."""
-    texts = [each["text"] for each in document.get("warnings") or () if each["text"] not in said]
-    entries = "".join(f"<li>{escape(text)}</li>" for text in texts)
-    return f'<ul class="warnings">{entries}</ul>\n' if entries else ""
-
-
-def _numbers(fit: Mapping[str, Any]) -> str:
-    """The errors before and after, large."""
-    labels = {
-        "force_error": "Force error",
-        "holdout_force_error": "… on the held-out recording",
-        "simulation_error": "Simulation error",
-        "filtered_force_error": "Filtered force error",
-        "filtered_holdout_force_error": "… on the held-out recording",
-    }
-    entries = [
-        (label, f"{_percent(fit[key].get('before'))} → {_percent(fit[key].get('after'))}")
-        for key, label in labels.items()
-        if fit.get(key)
-    ]
-    if fit.get("noise_floor") is not None:
-        entries.append(("Noise floor of the force error", _percent(fit["noise_floor"])))
-    cells = [f"<div><dt>{escape(label)}</dt><dd>{value}</dd></div>" for label, value in entries]
-    return f'<dl class="numbers">{"".join(cells)}</dl>{_how_measured(fit)}' if cells else ""
-
-
-def _how_measured(fit: Mapping[str, Any]) -> str:
-    """What the figures are, where there are two kinds."""
-    width = (fit.get("filtered_force_error") or {}).get("width")
-    if width is None:
-        return ""
-    text = (
-        "Force error: norm(force − predicted)/norm(force) over the samples in motion, as jaxfric "
-        "predict has it with the saved model, noise and all. Filtered: both passed through the "
-        f"kernel by which effects are looked for, half-width {1e3 * width:.3g} ms."
-    )
-    adjusted = fit.get("holdout_adjusted") or {}
-    for key, how in (("left_out", "left out"), ("rephased", "taken at its own phase")):
-        if names := adjusted.get(key):
-            text += f" On the held-out recording {', '.join(map(_spoken, names))} is {how}."
-    return f'<p class="note">{escape(text)}</p>'
-
-
-def _section(title: str, content: str, note: str = "") -> str:
-    """A part of the page; nothing where there is no content."""
-    if not content:
-        return ""
-    remark = f'<p class="note">{escape(note)}</p>' if note else ""
-    return f"<section>\n<h2>{escape(title)}</h2>\n{remark}{content}\n</section>"
-
-
-def _findings(document: Mapping[str, Any]) -> str:
-    rows = [
-        (
-            _spoken(finding["effect"]),
-            finding.get("sentence") or "",
-            finding.get("equation") or "",
-            _percent(finding.get("share"), 0),
-            _percent(finding.get("holdout_share"), 0),
-            _chance(finding.get("p_value")),
-        )
-        for finding in document.get("findings") or ()
-    ]
-    head = ("effect", "finding", "equation", "share", "held out", "p")
-    note = "Share: part of the mean-square residual that the effect removes, strongest first."
-    return _section("Findings", _table(head, rows, (3, 4, 5)), note)
-
-
-def _separation(document: Mapping[str, Any]) -> str:
-    """For each finding that could be another effect, the experiment that decides."""
-    rows = []
-    for finding in document.get("findings") or ():
-        if others := finding.get("confusable_with"):
-            known = EFFECTS.get(finding["effect"])
-            experiment = finding.get("separate_by") or (known.separate_by if known else "")
-            rows.append(
-                (_spoken(finding["effect"]), ", ".join(map(_spoken, others)), experiment or _NONE)
-            )
-    head = ("named", "could also be", "experiment that decides")
-    note = "This recording cannot tell these apart."
-    return _section("How to tell confusable effects apart", _table(head, rows), note)
-
-
-def _where(document: Mapping[str, Any], picture: str) -> str:
-    rows = [
-        (
-            _spoken(place["coordinate"]),
-            _percent(place.get("share"), 0),
-            _chance(place.get("p_value")),
-            place.get("detail") or "",
-        )
-        for place in document.get("where") or ()
-    ]
-    table = _table(("over", "share of the residual", "p", "detail"), rows, (1, 2))
-    note = "Mean residual over each coordinate: flat at zero where nothing is missing."
-    return _section("Where the model and the recording differ", table + picture, note)
-
-
-def _parameters(document: Mapping[str, Any]) -> str:
-    sources = [(_spoken(f["effect"]), f.get("parameters")) for f in document.get("findings") or ()]
-    sources.append(("baseline", (document.get("baseline") or {}).get("parameters")))
-    rows = [
-        (source, name, *_estimate(entry))
-        for source, entries in sources
-        for name, entry in (entries or {}).items()
-    ]
-    head = ("of", "parameter", "value", "± 95 %", "unit")
-    note = (
-        "The interval is two standard errors to either side; the baseline's values are those "
-        "without the findings."
-    )
-    return _section("Parameters", _table(head, rows, (2, 3)), note)
-
-
-def _estimate(entry: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Value, half the interval and unit; a value that was wrong with what it was."""
-    value = _number(entry.get("value", entry.get("to")))
-    if "from" in entry:
-        value = f"{_number(entry['from'])} → {value}"
-    error = entry.get("standard_error")
-    seen = error is not None and math.isfinite(error)
-    unit = entry.get("unit") or ""
-    return value, _number(HALF_WIDTH * error, 2) if seen else "not visible", unit
-
-
-def _not_visible(document: Mapping[str, Any]) -> str:
-    rows = [
-        (_spoken(e["effect"]), _number(e.get("smallest_detectable"), 3), e.get("unit") or "")
-        for e in document.get("not_visible") or ()
-    ]
-    head = ("effect", "smallest size that would have shown", "unit")
-    note = "Not found, which rules them out down to this size only."
-    return _section("What this recording could not have shown", _table(head, rows, (1,)), note)
-
-
-def _recording(document: Mapping[str, Any]) -> str:
-    facts, units = document.get("recording") or {}, _units(document)
-    labels = {
-        "samples": ("samples", "{:d}"),
-        "duration": ("duration", "{:.4g} s"),
-        "sample_rate": ("sample rate", "{:.6g} Hz"),
-        "segments": ("segments", "{:d}"),
-    }
+def _reproduce(document: Mapping[str, Any], command: str, date: str) -> dict[str, Any]:
+    """The command, the versions, the date and the files."""
+    facts = document.get("recording") or {}
     rows = [("file", facts.get("file") or _NONE)]
-    rows += [
-        (label, form.format(facts[key]))
-        for key, (label, form) in labels.items()
-        if facts.get(key) is not None
-    ]
+    rows += [("SHA-256", facts["sha256"])] if facts.get("sha256") else []
+    rate = facts.get("sample_rate")
+    if facts.get("samples") is not None:
+        at = f", {facts['duration']:.4g} s" if facts.get("duration") is not None else ""
+        rows.append(("samples", f"{facts['samples']}{at}" + (f" at {rate:.6g} Hz" if rate else "")))
+    units = _units(document)
     rows.append(("units", f"force in {units['force']}, position in {units['position']}"))
     rows += [("put in order", note) for note in facts.get("notes") or ()]
-    return _section("Recording", _table(("", ""), rows))
-
-
-def _spoken(name: str) -> str:
-    return str(name).replace("_", " ")
-
-
-def _number(value: float | None, digits: int = 5) -> str:
-    return _NONE if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
-
-
-def _percent(value: float | None, places: int = 2) -> str:
-    return _NONE if value is None or not math.isfinite(value) else f"{value:.{places}%}"
-
-
-def _chance(value: float | None) -> str:
-    if value is None or not math.isfinite(value):
-        return _NONE
-    return "< 0.001" if value < 0.001 else f"{value:.3f}"
+    other = document.get("holdout") or {}
+    if other.get("file"):
+        rows.append(("held out", f"{other['file']} (SHA-256 {other.get('sha256') or 'unknown'})"))
+    versions = document.get("versions") or {}
+    rows += [("versions", ", ".join(f"{n} {v}" for n, v in versions.items()))] if versions else []
+    rows += [("made on", date)] if date else []
+    return {"command": command, "reproduce": rows}

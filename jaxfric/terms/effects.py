@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .. import terms as laws
+from ..data.nearest import meant
 from .base import AbstractTerm
 from .catalogue import CATALOGUE, Effect as Effect
 
@@ -55,7 +56,8 @@ _OF_TERM: Mapping[type, str] = {
 def effect(name: str) -> Effect:
     """The effect of that name; raises `ValueError`, with the names there are, for another."""
     if name not in EFFECTS:
-        raise ValueError(f"No effect is called {name!r}; there are {', '.join(EFFECTS)}.")
+        near = meant(name, EFFECTS)
+        raise ValueError(f"No effect is called {name!r}; there are {', '.join(EFFECTS)}.{near}")
     return EFFECTS[name]
 
 

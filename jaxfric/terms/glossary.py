@@ -5,6 +5,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..data.provenance import versions
 from ..units import spell
 from .base import AbstractTerm
 from .effects import EFFECTS, Effect, effect
@@ -22,7 +23,11 @@ def document(names: Sequence[str] = ()) -> dict[str, Any]:
     Units are N, m, s. **Raises:** `ValueError` for a name that there is not.
     """
     chosen = [effect(name) for name in names] or list(EFFECTS.values())
-    return {"schema": SCHEMA, "effects": [_entry(each) for each in chosen]}
+    return {
+        "schema": SCHEMA,
+        "effects": [_entry(each) for each in chosen],
+        "versions": versions(),
+    }
 
 
 def _entry(each: Effect) -> dict[str, Any]:

@@ -59,7 +59,7 @@ class Log(NamedTuple):
     def both(self) -> tuple[Recording, Recording | None]:
         """The recording and the held-out one; nothing of their names."""
         logs = [
-            dataclasses.replace(read(file, **self.reading), source=self.name)
+            dataclasses.replace(read(file, **self.reading), source=self.name, sha256="")
             for file in (self.file, self.holdout)
             if file is not None
         ]

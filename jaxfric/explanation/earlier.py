@@ -1,0 +1,101 @@
+"""Another recording as the baseline: what it obeys, and which of its values hold here no more.
+
+The other is an earlier recording of the same machine, or a simulator's run of another motion.
+"""
+
+import dataclasses
+from pathlib import PurePath
+
+import numpy as np
+
+from ..data.recording import Recording
+from . import parameters as spelled, verification
+from .baseline import SURE, Baseline, Mismatch
+from .evidence import Evidence
+from .locate import locate
+from .naming import LEAST_SHARE, Named
+from .predictions import PREDICTED, with_predictions
+from .question import Question
+from .regression import Fit, fit
+from .telling import rough, shown_places
+
+
+@dataclasses.dataclass(frozen=True)
+class Earlier:
+    """An earlier recording of the same machine, as a baseline: what has changed since?
+
+    Its force is measured; a Recording alone, of the same motion, is taken for a simulator's.
+    """
+
+    recording: Recording
+
+
+def obeyed(recording: Recording, asked: Question, found: Named, seed: int = 0) -> Baseline:
+    """The baseline that a recording obeys, as explaining it found it.
+
+    Without what belongs to a moment of it, which says nothing about another, and without what acts
+    on the force that the rest predicts, which no baseline can hold.
+    """
+    evidence = with_predictions(asked.evidence, found.last)
+    kept = verification.lasting(found.last)
+    plain = [i for i, t in enumerate(kept.terms) if not t.coordinates & PREDICTED]
+    kept, now = kept.only(plain), found.last
+    if len(kept.terms) < len(now.terms):
+        now = fit(kept.terms, evidence, kept.betas)
+    force = float(np.sqrt(np.mean(evidence.force**2)))
+    seen = with_predictions(asked.evidence, now)
+    places = shown_places(locate(seen, now, seed), LEAST_SHARE, force)
+    own = verification.error(now, asked.evidence)
+    errors = {
+        "force_error": {"before": own, "after": own},
+        "holdout_force_error": None,
+        "noise_floor": verification.noise(now, evidence.force),
+    }
+    named = spelled.estimates(now, asked.block, recording.unit_names)
+    columns = [
+        [known[p.name].standard_error for p in (*term.affine, *term.nonlinear)]
+        for term, known in zip(now.terms, named, strict=True)
+    ]
+    counts = [len(term.affine) for term in now.terms]
+    affine = [e for own, count in zip(columns, counts, strict=True) for e in own[:count]]
+    searched = [e for own, count in zip(columns, counts, strict=True) for e in own[count:]]
+    return Baseline(
+        spelled.whole(now),
+        f"recording {PurePath(recording.source).name}".rstrip(),
+        spelled.model(now, recording.units),
+        np.asarray([*affine, *searched], float),
+        now,
+        frozenset(place.coordinate for place in places),
+        rough(errors, {}),
+    )
+
+
+def rephased(known: Baseline, evidence: Evidence) -> Baseline:
+    """The baseline with its waves over position at their phase here, their amplitude kept.
+
+    The zero of an incremental encoder is another after each homing.
+    """
+    now: Fit = known.fit
+    waves = frozenset(i for i in range(1, len(now.terms)) if verification.wavelike(now, i))
+    if not waves:
+        return known
+    there = verification.at_phase(now, evidence, waves)
+    return known._replace(model=spelled.model(there, known.model.units), fit=there)
+
+
+def changed(wrong: Mismatch | None, known: Baseline, now: Fit, errors) -> Mismatch | None:
+    """The values that hold here no more; `None` where all lie within what both recordings leave
+    open. Values that do move with the others.
+
+    **Arguments:** `now`, the baseline refitted here, `errors`, the standard errors of its
+    parameters, affine ones first.
+    """
+    if wrong is None or known.errors is None:
+        return wrong
+    values = [*now.alphas[0], *now.betas[0]]
+    within = frozenset(
+        i
+        for i, before in wrong.moved.items()
+        if not abs(values[i] - before) > SURE * np.hypot(errors[i], known.errors[i])
+    )
+    return wrong._replace(within=within) if within < set(wrong.moved) else None

@@ -1,0 +1,122 @@
+"""Each finding over its own coordinate: what is measured of it, and its law with a 95 % band.
+
+What is measured of one term is the force less all the other terms: its component plus the residual
+(Larsen & McCleary 1972).
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..terms.effects import EFFECTS
+from ..terms.time import PeriodicDisturbance
+from . import verification
+from .baseline import Mismatch
+from .bins import Axis, Bins, axis
+from .evidence import Evidence
+from .improvement import Improved
+from .intervals import covariance
+from .locate import coordinates
+from .predictions import with_predictions
+from .question import Question
+from .regression import Fit
+
+# Half a 95 % interval in standard errors, as in the findings' sentences.
+HALF_WIDTH = 2.0
+
+
+def partial_residuals(asked: Question, better: Improved) -> list[dict[str, Any]]:
+    """The picture of each finding, in the order of discovery, as plain lists.
+
+    Each holds `coordinate`, `unit`, `at`, and at these places `measured` with its standard error
+    `error`, `law` between `low` and `high`, and the mean residual `before` and `after`.
+    """
+    pictures = []
+    for number, taken in enumerate(better.found.taken):
+        late = number >= len(better.rest[1].taken)
+        where, named = (asked, better.found) if late else better.rest
+        now = named.last
+        place = len(now.terms) - len(named.taken) + number
+        seen = with_predictions(where.evidence, now)
+        law = now.part(place)
+        slopes, spread = _parameters(now, place, where.block)
+        along = _along(taken.trial.candidate.effect.name, now, place, seen)
+        before = verification.residual(better.first, where.evidence)
+        pictures.append(
+            _picture(along, law, now.residual, before) | _band(along, law, slopes, spread)
+        )
+    return pictures
+
+
+def moved(asked: Question, better: Improved, wrong: Mismatch) -> dict[str, Any]:
+    """The picture of wrong values: by how much the baseline's force changes with the right ones."""
+    where, named = better.rest
+    names = [p.name for p in (*better.first.terms[0].affine, *better.first.terms[0].nonlinear)]
+    inertial = any(names[i].startswith("inertia") for i in wrong.moved)
+    seen = with_predictions(where.evidence, named.last)
+    along = axis("acceleration" if inertial else "velocity", seen, seen.motion.unit_names)
+    before = verification.residual(better.first, where.evidence)
+    law = named.last.part(0) - (where.evidence.target - before)
+    return _picture(along, law, named.last.residual, before)
+
+
+def _picture(along: Axis, law, residual, before) -> dict[str, Any]:
+    bins = Bins(along)
+    return {
+        "coordinate": along.label,
+        "unit": along.unit,
+        "at": bins.at.tolist(),
+        "measured": bins.mean(law + residual).tolist(),
+        "error": bins.error(residual).tolist(),
+        "law": bins.mean(law).tolist(),
+        "before": bins.mean(before).tolist(),
+        "before_error": bins.error(before).tolist(),
+        "after": bins.mean(residual).tolist(),
+    }
+
+
+def _band(along: Axis, law, slopes: np.ndarray, spread: np.ndarray) -> dict[str, Any]:
+    """The law's 95 % band, by the covariance of its parameters; none where one is not seen."""
+    if not np.all(np.isfinite(spread)):
+        return {}
+    bins = Bins(along)
+    gradient = np.stack([bins.mean(column) for column in slopes.T], axis=1)
+    half = HALF_WIDTH * np.sqrt(np.maximum(np.sum(gradient @ spread * gradient, axis=1), 0.0))
+    middle = bins.mean(law)
+    return {"low": (middle - half).tolist(), "high": (middle + half).tolist()}
+
+
+def _parameters(now: Fit, place: int, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The derivatives of the force by one term's parameters, `(J, k)`, and their covariance."""
+    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
+    own = [*range(affine[place], affine[place + 1]), *range(searched[place], searched[place + 1])]
+    return now.jacobian[:, own], covariance(now, block)[np.ix_(own, own)]
+
+
+def _along(effect: str, now: Fit, place: int, seen: Evidence) -> Axis:
+    """The coordinate over which an effect shows, a wave's folded at its period."""
+    units: Mapping[str, str] = seen.motion.unit_names
+    known = coordinates(seen)
+    term, beta = now.terms[place], now.betas[place]
+    wanted = EFFECTS[effect].coordinates
+    name = next((n for n in wanted if n.removesuffix("_lines") in known), "velocity")
+    period = _period(term, beta)
+    plain = name.removesuffix("_lines")
+    if period is not None:
+        value = np.asarray(known[plain][0])[seen.centre]
+        # What repeats less than twice is shown as it lies.
+        if np.ptp(value) < 2 * period:
+            period = None
+    return axis(plain, seen, units, period)
+
+
+def _period(term, beta) -> float | None:
+    """The period of a wave, in its coordinate; `None` for another term."""
+    for parameter, value in zip(term.nonlinear, beta, strict=True):
+        if parameter.name == "pitch" or parameter.name.endswith("_period"):
+            return float(value)
+        if isinstance(term, PeriodicDisturbance) and parameter.name == "frequency":
+            return 1 / float(value)
+    return None

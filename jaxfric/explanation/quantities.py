@@ -1,0 +1,67 @@
+"""Values as an engineer writes them: with a prefix, half their 95 % interval, per revolution."""
+
+import math
+
+from ..identification.uncertainty import Estimate
+
+# Smaller units, by the unit that a value is in; a value takes the first that makes it at least one.
+_SMALLER = {
+    "m": (("mm", 1e-3), ("µm", 1e-6)),
+    "s": (("ms", 1e-3), ("µs", 1e-6)),
+    "N": (("mN", 1e-3),),
+    "N·m": (("mN·m", 1e-3), ("µN·m", 1e-6)),
+    "A": (("mA", 1e-3),),
+}
+# Below this, a smaller unit is used.
+SMALL = 0.05
+# What angles count a revolution as.
+TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
+
+
+def quantity(estimate: Estimate) -> str:
+    """A value with its unit and half its 95 % interval: "1.90 N ± 0.20 N"."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if math.isinf(error):  # the data cannot see it, and its value is any
+        return "an amount that this recording cannot tell"
+    name, scale = _unit(estimate.unit, max(abs(value), 2 * error if error > 0 else 0.0))
+    value, error = value / scale, error / scale
+    unit = f" {name}" if name not in ("", "1") else ""
+    if not error > 0:
+        return f"{value:.3g}{unit}"
+    half = 2 * error
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    if abs(value) >= 1e5 or 0 < abs(value) < 1e-3:
+        return f"{value:.3g}{unit} ± {half:.1g}{unit}"
+    return f"{value:.{digits}f}{unit} ± {half:.{digits}f}{unit}"
+
+
+def _unit(unit: str, size: float) -> tuple[str, float]:
+    """The unit to write a value of that size in, and what one of it is in the given unit."""
+    if unit == "1/s":
+        return "Hz", 1.0
+    if not 0 < size < SMALL:
+        return unit, 1.0
+    for smaller in _SMALLER.get(unit, ()):
+        if size >= smaller[1]:
+            return smaller
+    return _SMALLER[unit][-1] if unit in _SMALLER else (unit, 1.0)
+
+
+def nil(estimate: Estimate) -> bool:
+    """Whether a size may be nil: it is no larger than half its interval, as they are written."""
+    value, half = abs(float(estimate.value)), 2 * float(estimate.standard_error)
+    return 0 < half < math.inf and value <= 1.05 * half
+
+
+def turns(period: Estimate) -> str:
+    """How often a period of an angle goes into a revolution: " (5 times per revolution)"."""
+    turn = TURNS.get(period.unit)
+    value, error = float(period.value), float(period.standard_error)
+    if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
+        return ""
+    count, half = turn / value, 2 * turn * error / value**2
+    whole = round(count)
+    # A wave of the motor or its gear goes a whole number of times into a revolution.
+    if whole and abs(count - whole) <= max(half, 0.01 * whole):
+        return f" ({'once' if whole == 1 else f'{whole} times'} per revolution)"
+    return f" ({count:.3g} per revolution)"

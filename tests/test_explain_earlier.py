@@ -1,0 +1,83 @@
+"""What changed in a machine between two recordings."""
+
+import dataclasses
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxfric import terms
+from jaxfric.cli import main
+from jaxfric.explanation import Earlier, explain
+from jaxfric.explanation.explained import Moved
+from jaxfric.explanation.sentences import changed_sentence, parameter
+
+from .test_cli import write_axis
+from .test_explain import healthy as healthy, planted
+
+
+@pytest.fixture(autouse=True)
+def _no_cache(monkeypatch):
+    monkeypatch.setenv("JAXFRIC_CACHE", "off")
+
+
+def with_friction(recording, more):
+    return planted(recording, terms.Coulomb(), (more,))
+
+
+def test_more_coulomb_friction_is_told_with_its_change(healthy):
+    found = explain(with_friction(healthy[1], 2.0), Earlier(healthy[0]))
+    assert found.verdict == "explained" and [f.effect for f in found.findings] == [
+        "parameter_mismatch"
+    ]
+    moved = found.findings[0].parameters
+    assert set(moved) == {"coulomb+", "coulomb-"}
+    for name, value in (("coulomb+", 22.0), ("coulomb-", 18.0)):
+        change = moved[name].value - moved[name].before
+        error = np.hypot(moved[name].standard_error, moved[name].before_error)
+        assert change == pytest.approx(2.0, abs=4 * error) and error < 0.5
+        assert moved[name].before == pytest.approx(value, abs=1.0)
+    assert "Coulomb friction forwards rose from 2" in found.findings[0].sentence
+    assert "since run 0" in found.findings[0].sentence
+    assert "What is named accounts for the difference" in found.summary
+
+
+def test_the_same_machine_has_not_changed(healthy):
+    found = explain(healthy[1], Earlier(healthy[0]))
+    assert found.verdict == "consistent" and not found.findings
+    assert "Nothing differs" in found.summary
+
+
+@pytest.mark.slow
+def test_another_homing_is_no_change(healthy):
+    """Cogging of one amplitude at another phase: the encoder's zero is another."""
+    cogging = (terms.Cogging(), (2.0, 1.0), (0.01,))
+    old, new = (planted(run, *cogging) for run in healthy)
+    moved = dataclasses.replace(new, position=new.position + jnp.asarray(0.0037))
+    found = explain(moved, Earlier(old))
+    assert found.verdict == "consistent", found.summary
+
+
+def test_the_sentence_has_both_values_and_the_error_of_the_change():
+    moved = {
+        "coulomb+": Moved(20.1, 22.3, 0.08, "N", 0.06),
+        "viscous-": Moved(240.0, 201.0, 4.0, "N·s/m", 3.0),
+    }
+    assert changed_sentence(moved, 0.71, "old.csv") == (
+        "Coulomb friction forwards rose from 20.10 to 22.30 N (± 0.20), viscous friction backwards "
+        "fell from 240 to 201 N·s/m (± 10) since old.csv; 71% of the difference."
+    )
+    assert parameter("inertia") == "inertia" and parameter("coulomb") == "Coulomb friction"
+
+
+def test_the_command_takes_an_earlier_recording(tmp_path, capsys):
+    old, new = (write_axis(tmp_path / f"{n}.csv", 4001, seed=i) for i, n in enumerate("ab"))
+    out = tmp_path / "changed.json"
+    assert main(["explain", new, "--baseline", new, "--json", str(out)]) == 2
+    assert "b.csv itself" in capsys.readouterr().err and not out.exists()
+    # The same commanded motion, as maintenance repeats it.
+    assert main(["explain", new, "--baseline", old, "--json", str(out)]) == 0
+    told = json.loads(out.read_text("utf-8"))
+    assert told["baseline"]["name"] == "recording a.csv" and len(told["baseline"]["sha256"]) == 64
+    assert told["verdict"] == "consistent" and "Nothing differs" in capsys.readouterr().out

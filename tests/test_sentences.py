@@ -1,0 +1,85 @@
+"""What is said of findings, as an engineer says it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from jaxfric.explanation.quantities import nil, quantity, turns
+from jaxfric.explanation.sentences import sentence
+from jaxfric.identification.uncertainty import Estimate
+
+
+def estimate(value, error, unit):
+    return Estimate(np.float64(value), np.float64(error), unit)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "text"),
+    [
+        (0.0025002, 1.2e-6, "m", "2.5002 mm ± 0.0024 mm"),
+        (0.000192, 3.5e-5, "m", "192 µm ± 70 µm"),
+        (0.43, 0.01, "m", "0.430 m ± 0.020 m"),
+        (0.00144, 7e-5, "N·m", "1.44 mN·m ± 0.14 mN·m"),
+        (17.1487, 0.00315, "1/s", "17.1487 Hz ± 0.0063 Hz"),
+        (0.0072, 0.0, "s", "7.2 ms"),
+        (1.9, 0.1, "N", "1.90 N ± 0.20 N"),
+        (3.0, math.inf, "N", "an amount that this recording cannot tell"),
+        (0.7, 0.125, "1", "0.70 ± 0.25"),
+    ],
+)
+def test_a_value_has_the_unit_that_reads_best(value, error, unit, text):
+    assert quantity(estimate(value, error, unit)) == text
+
+
+@pytest.mark.parametrize(
+    ("period", "error", "unit", "text"),
+    [
+        (2 * math.pi / 7, 0.001, "rad", " (7 times per revolution)"),
+        (72.0, 0.1, "deg", " (5 times per revolution)"),
+        (2 * math.pi, 0.01, "rad", " (once per revolution)"),
+        (2 * math.pi / 6.5, 0.001, "rad", " (6.5 per revolution)"),
+        (120.0, 18.0, "rad", ""),
+        (0.0025, 1e-6, "m", ""),
+    ],
+)
+def test_periods_of_an_angle_are_told_per_revolution(period, error, unit, text):
+    assert turns(estimate(period, error, unit)) == text
+
+
+def test_a_size_no_larger_than_its_interval_may_be_nil():
+    assert nil(estimate(0.9878, 0.4928, "N")) and not nil(estimate(1.2, 0.1, "N"))
+    assert not nil(estimate(1.2, 0.0, "N")) and not nil(estimate(1.2, math.inf, "N"))
+
+
+def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
+    values = {
+        "amplitude": estimate(0.99, 0.1, "N"),
+        "friction_period": estimate(0.43, 0.22, "m"),
+    }
+    told = sentence("position_dependent_friction", values, 0.14, (), 0.25)
+    assert "varies slowly along the stroke, by 0.99 N" in told and "0.43" not in told
+    told = sentence("position_dependent_friction", values, 0.14, (), 2.0)
+    assert "with a period of 0.43 m" in told
+
+
+@pytest.mark.parametrize(("reach", "soft"), [(0.09, True), (0.01, False)])
+def test_a_stop_over_much_of_the_stroke_is_too_soft_for_one(reach, soft):
+    values = {
+        "lower_stop_position": estimate(0.095, 0.02, "m"),
+        "lower_stop_stiffness": estimate(9.7, 2.0, "N/m"),
+        "stop_reach": estimate(reach, 0.0, "m"),
+    }
+    told = sentence("end_stop", values, 0.09, (), 0.25)
+    assert ("too soft for an end stop" in told) == soft
+    assert ("an elastic end stop" in told) != soft
+
+
+@pytest.mark.parametrize(("damping", "swings"), [(0.7, False), (0.05, True)])
+def test_a_load_that_is_damped_much_does_not_swing(damping, swings):
+    values = {
+        "load_resonance": estimate(4.57, 0.33, "1/s"),
+        "damping_ratio": estimate(damping, 0.01, "1"),
+    }
+    told = sentence("compliance", values, 0.05, ())
+    assert ("The load swings" in told) == swings and "4.57 Hz" in told
