@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from .data.recording import Recording as Recording, pad as pad, stack as stack
     from .explanation import Explanation as Explanation, explain as explain
     from .identification import devices as devices
+    from .identification.constant_velocity import (
+        ConstantVelocity as ConstantVelocity,
+        constant_velocity as constant_velocity,
+    )
     from .identification.identified import Identified as Identified, Result as Result
     from .identification.identifying import identify as identify
     from .identification.projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
@@ -46,6 +50,7 @@ _NAMES = {
     "data.io": ("read",),
     "data.recording": ("Recording", "pad", "stack"),
     "explanation": ("Explanation", "explain"),
+    "identification.constant_velocity": ("ConstantVelocity", "constant_velocity"),
     "identification.identified": ("Identified", "Result"),
     "identification.identifying": ("identify",),
     "identification.projections": ("ClosedWindows", "WeakForm"),

@@ -15,6 +15,7 @@ from ..data.io import read_with_notes, write_bytes, write_table, write_text
 from ..data.recording import Recording, uniform
 from ..data.writing import csv_text
 from ..identification import documents, tabulate
+from ..identification.constant_velocity import constant_velocity
 from ..identification.identified import Identified
 from ..identification.identifying import identify as identify_recording
 from ..identification.projections import AbstractProjection, ClosedWindows, WeakForm
@@ -119,7 +120,8 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
     """The document of one file; its model and picture are written."""
     recording, notes = read(path, arguments)
     name, found = fitted(recording, arguments.model, arguments.projection, arguments.bounds)
-    document = documents.identification(found, recording, notes) | {"name": name}
+    test = constant_velocity(recording, found)
+    document = documents.identification(found, recording, notes, test) | {"name": name}
     if arguments.save or arguments.plot:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")

@@ -57,6 +57,8 @@ def identified(
     """The paragraphs and the table of [`identification`][]; the recording may be absent."""
     result = f"force error {_percent(document['force_error'])}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
+    if said := document.get("constant_velocity", {}).get("summary"):
+        told.append(said)
     if document["result"] != "not_passive":
         told += _remarks(document["parameters"])
     return [
