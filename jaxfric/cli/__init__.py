@@ -132,6 +132,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_effects,
         _add_fleet,
         _add_prove,
+        _add_watch,
     ):
         add(commands)
     return parser
@@ -311,3 +312,10 @@ def _add_fleet(commands) -> None:
 
 def _add_prove(commands) -> None:
     options.proving(_add(commands, "prove", "prove.run", "the concealed-effect benchmark"))
+
+
+def _add_watch(commands) -> None:
+    command = _add(commands, "watch", "watch.run", "parameters and changes as data arrive")
+    command.add_argument("file", metavar="FILE", help="a CSV that grows, or - for standard input")
+    options.watching(command)
+    options.following(command)

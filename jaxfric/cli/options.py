@@ -194,6 +194,24 @@ def sizes(text: str) -> tuple[float, float]:
 
 def reading(command: ArgumentParser) -> None:
     """Add the options that say how to read a file."""
+    group = _columns(command)
+    group.add_argument(
+        "--period",
+        type=factors,
+        default={},
+        metavar="position=NUMBER",
+        help="the position is counted modulo this, before scaling: make it continuous",
+    )
+    group.add_argument(
+        "--no-repair",
+        action="store_false",
+        dest="repair",
+        help="leave clock, samples and position as they are (not finite samples are masked)",
+    )
+
+
+def _columns(command: ArgumentParser):
+    """The options that say which columns, in which units."""
     group = command.add_argument_group("how to read the file")
     group.add_argument(
         "--columns",
@@ -216,18 +234,50 @@ def reading(command: ArgumentParser) -> None:
         metavar="force=N,position=m",
         help="after scaling; they name, they do not convert",
     )
-    group.add_argument(
-        "--period",
-        type=factors,
-        default={},
-        metavar="position=NUMBER",
-        help="the position is counted modulo this, before scaling: make it continuous",
+    return group
+
+
+def following(command: ArgumentParser) -> None:
+    """Add the options that say how to read a stream."""
+    _columns(command)
+
+
+def watching(command: ArgumentParser) -> None:
+    """Add the options of following a stream."""
+    command.add_argument(
+        "--model",
+        default="coulomb-viscous",
+        metavar="NAME",
+        help="a name that jaxfric models lists (default: coulomb-viscous)",
     )
-    group.add_argument(
-        "--no-repair",
-        action="store_false",
-        dest="repair",
-        help="leave clock, samples and position as they are (not finite samples are masked)",
+    forget = command.add_mutually_exclusive_group()
+    forget.add_argument(
+        "--keep",
+        type=seconds,
+        default=math.inf,
+        metavar="SECONDS",
+        help="slip time of a direction after which a stroke weighs 1/e (default: nothing fades)",
+    )
+    forget.add_argument(
+        "--window", type=count, default=0, metavar="N", help="only the last N strokes each way"
+    )
+    command.add_argument(
+        "--every",
+        type=seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="of the stream's clock, between two lines of parameters (default: 10)",
+    )
+    command.add_argument(
+        "--false-alarms",
+        type=number,
+        default=1e-4,
+        metavar="RATE",
+        help="of the change detection, a stroke of a direction (default: 0.0001)",
+    )
+    command.add_argument("--once", action="store_true", help="stop at the end of the file")
+    command.add_argument(
+        "--json", action="store_true", dest="json_lines", help="one JSON document a line"
     )
 
 
