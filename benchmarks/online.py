@@ -3,8 +3,8 @@
     python benchmarks/online.py
 
 The stream: an axis of 5 kg with asymmetric Coulomb, viscous and Lorentzian friction, 500 Hz, a
-stroke a second, force noise 0.5 N, position through an encoder. Both see the same velocity, derived
-with a fixed delay. Recursive least squares (RLS, with a forgetting factor) fits inertia, Coulomb and
+stroke a second, force noise 0.5 N, an encoder. Both see the same velocity, derived
+with a fixed delay. Recursive least squares (RLS, which forgets) fits inertia, Coulomb and
 viscous friction of each direction to the force and the differentiated velocity; it cannot fit the
 bump, whose velocity is not linear. Printed: the root mean square error of the friction curve over
 0.01 to 0.14 m/s, N, in the last fifth of each stream, and microseconds.

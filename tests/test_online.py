@@ -61,7 +61,7 @@ def followed(seconds, model="lorentzian", **how):
 
 def test_the_parameters_are_those_of_the_axis_without_its_mass():
     state, news = run(online.start(1e-3, 0.2), samples(60, noise=0.0))
-    assert list(state.count) == [29, 30] and int(np.sum(news.closed)) == 59
+    assert list(state.strokes) == [29, 30] and int(np.sum(news.closed)) == 59
     found = online.solve(solving.friction_only("lorentzian"), state)
     assert bool(found.settled)
     for name, value in found.model.parameters.items():
@@ -85,7 +85,7 @@ def test_the_object_does_what_the_scan_does(how):
     assert not changes
     for ours, theirs in zip(follower.state().total, state.total, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
-    assert follower.strokes == tuple(int(c) for c in state.count)
+    assert follower.strokes == tuple(int(c) for c in state.strokes)
 
 
 def test_memory_is_constant_and_the_update_is_pure():
@@ -164,11 +164,11 @@ def test_gaps_and_missing_samples_break_a_stroke_only():
     values = np.delete(values, slice(6000, 6400), axis=0)
     state, _ = run(online.start(1e-3, 0.2), jnp.asarray(values))
     whole, _ = run(online.start(1e-3, 0.2), samples(20))
-    assert 1 <= int(jnp.sum(whole.count - state.count)) <= 4
+    assert 1 <= int(jnp.sum(whole.strokes - state.strokes)) <= 4
     follower = online.Follower("coulomb-viscous", slowest=1e-3, fastest=0.2)
     for row in values.tolist():
         follower.add(*row)
-    assert follower.strokes == tuple(int(c) for c in state.count)
+    assert follower.strokes == tuple(int(c) for c in state.strokes)
 
 
 def test_misuse_is_said():

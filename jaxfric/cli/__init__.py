@@ -132,6 +132,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_effects,
         _add_fleet,
         _add_prove,
+        _add_select,
         _add_watch,
     ):
         add(commands)
@@ -312,6 +313,17 @@ def _add_fleet(commands) -> None:
 
 def _add_prove(commands) -> None:
     options.proving(_add(commands, "prove", "prove.run", "the concealed-effect benchmark"))
+
+
+def _add_select(commands) -> None:
+    command = _add(
+        commands, "select", "commands.selection", "which friction model a recording supports"
+    )
+    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the standings; - prints them"
+    )
+    options.reading(command)
 
 
 def _add_watch(commands) -> None:

@@ -24,7 +24,7 @@ class Chart(NamedTuple):
     deviations, and the two cumulative sums, upward and downward, in deviations.
     """
 
-    count: Float[Array, "..."]
+    number: Float[Array, "..."]
     mean: Float[Array, "..."]
     square: Float[Array, "..."]
     up: Float[Array, "..."]

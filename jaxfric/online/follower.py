@@ -36,7 +36,7 @@ class Follower:
 
     The arithmetic is that of [`update`][jaxfric.online.update], in plain Python, which is quicker
     one sample at a time. After [`SETTLED`][] strokes of each direction the curve identified so far
-    becomes the reference of the charts; a change forgets all and begins anew.
+    becomes the reference of the charts; a change forgets nearly all and begins anew.
 
     **Arguments:** `model`, a name or a sum of functions of velocity; `slowest`, `fastest`, `keep`,
     `window`, `false_alarms` as for [`start`][jaxfric.online.start].
@@ -63,14 +63,22 @@ class Follower:
         self._height, self._keep, self._window = float(first.height), keep, window
         self._last: tuple[float, float, float] | None = None
         self._interval = 0.0
+        size = len(self._speeds)
+        self._total = Sums(np.zeros((2, size)), np.zeros((2, size)), np.zeros(2))
+        self._ring: list[list[Sums]] = [[], []]
+        self._usual = [0.0, 0.0]
         self._anew()
         self._curve()  # compiled before the first sample, not between two
 
     def _anew(self) -> None:
-        size = len(self._speeds)
-        self._total = Sums(np.zeros((2, size)), np.zeros((2, size)), np.zeros(2))
-        self._ring: list[list[Sums]] = [[], []]
-        self._count, self._usual = [0, 0], [0.0, 0.0]
+        """What was before counts as a tenth of a stroke: until new ones come it is all there is."""
+        for side in (0, 1):
+            self._ring[side] = self._ring[side][-1:]
+            seconds = float(self._total.weight[side].sum())
+            kept = min(1.0, 0.1 * self._usual[side] / seconds) if seconds > 0 else 0.0
+            for values in self._total:
+                values[side] = kept * values[side]
+        self._count = [0, 0]
         self._inside = [False, False]
         self._stroke = [self._empty(), self._empty()]
         self._reference: np.ndarray | None = None
@@ -195,4 +203,4 @@ class Follower:
         total = jax.tree.map(lambda x: jnp.asarray(x, state.nodes.dtype), self._total)
         count, usual = (jnp.asarray(x, state.nodes.dtype) for x in (self._count, self._usual))
         interval = jnp.asarray(self._interval, state.nodes.dtype)
-        return state._replace(total=total, count=count, usual=usual, interval=interval)
+        return state._replace(total=total, strokes=count, usual=usual, interval=interval)

@@ -44,7 +44,7 @@ class State(NamedTuple):
     - `total`: the [`Sums`][] of closed strokes in each direction, `(2, K)`, forward first.
     - `stroke`: those of the stroke under way; `inside`: whether its beginning was seen, `(2,)`.
     - `ring`: the last strokes of each direction where a window forgets, `(2, n, K)`; else `n` = 0.
-    - `count`: closed strokes, `(2,)`; `usual`: their mean duration, s, `(2,)`.
+    - `strokes`: closed strokes, `(2,)`; `usual`: their mean duration, s, `(2,)`.
     - `keep`: time constant of forgetting in slip time of a direction, s (infinite: never).
     - `last`: time, velocity and force of the last sample, `(3,)`; `interval`: the mean step, s.
     - `reference`: force at the nodes that strokes are compared with, N, `(2, K)`; NaN: none yet.
@@ -56,7 +56,7 @@ class State(NamedTuple):
     stroke: Sums
     inside: Bool[Array, " 2"]
     ring: Sums
-    count: Float[Array, " 2"]
+    strokes: Float[Array, " 2"]
     usual: Float[Array, " 2"]
     keep: Float[Array, ""]
     last: Float[Array, " 3"]
@@ -116,7 +116,7 @@ def start(
 
 def reference(state: State, force: Float[Array, "2 K"]) -> State:
     """The state with a curve at its nodes to compare strokes with, N (signed); charts anew."""
-    return state._replace(reference=force, chart=chart.empty(state.count))
+    return state._replace(reference=force, chart=chart.empty(state.strokes))
 
 
 def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
@@ -190,14 +190,14 @@ def _closed(state: State, closed, broken) -> tuple[State, News]:
         moved = jax.tree.map(lambda new, old: jnp.where(charted, new, old), moved, state.chart)
         kept = jnp.where(closed, jnp.exp(-time / state.keep), 1.0)
         total, ring = _forgotten(state, stroke, closed, kept)
-        count = state.count + closed.astype(state.count.dtype)
+        count = state.strokes + closed.astype(state.strokes.dtype)
         usual = jnp.where(
             closed, state.usual + (time - state.usual) / jnp.minimum(count, 50.0), state.usual
         )
         news = News(closed, jnp.where(charted, excess, jnp.nan), charted & alarm)
         over = closed | broken
         left = jax.tree.map(lambda s: jnp.where(_column(over, s), 0.0, s), stroke)
-        more = {"ring": ring, "count": count, "usual": usual, "chart": moved}
+        more = {"ring": ring, "strokes": count, "usual": usual, "chart": moved}
         return state._replace(total=total, stroke=left, **more), news
 
     def go_on(state: State):
@@ -221,7 +221,7 @@ def _forgotten(state: State, stroke: Sums, closed, kept) -> tuple[Sums, Sums]:
             state.total, stroke,
         )  # fmt: skip
         return total, state.ring
-    place = (state.count % size).astype(jnp.int32)
+    place = (state.strokes % size).astype(jnp.int32)
     side = jnp.arange(2)
 
     def put(ring, new):

@@ -78,7 +78,7 @@ def solve(term: AbstractTerm, state: State) -> Solution:
     whole = jnp.sum(seconds)
     cost = jnp.sqrt(jnp.maximum(jnp.sum(square), 0.0) / jnp.where(whole > 0, whole, 1.0))
     settled = found.converged & ~found.on_border
-    return Solution(Model(known, alpha), state.count, seconds, cost, settled)
+    return Solution(Model(known, alpha), state.strokes, seconds, cost, settled)
 
 
 def _scales(state: State) -> Scales:
