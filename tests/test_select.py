@@ -42,8 +42,8 @@ def test_the_right_shape_is_chosen(kind):
 
 def test_without_slow_motion_it_is_said_that_shapes_cannot_be_told():
     found = jf.select(machine("gaussian", 0, slow=False))
-    assert found.name in found.tied and len(found.tied) > 2
-    assert "because no motion below 0.0" in found.reason
+    assert found.name == "coulomb-viscous" and found.name in found.tied
+    assert "because no motion below" in found.reason
 
 
 def test_the_standings_are_those_of_identifying_each_one():

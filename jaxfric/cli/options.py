@@ -164,9 +164,18 @@ def count(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A time span over zero, s."""
+    return _over_zero(text, "a number of seconds over zero")
+
+
+def positive(text: str) -> float:
+    """A number over zero."""
+    return _over_zero(text, "a number over zero")
+
+
+def _over_zero(text: str, wanted: str) -> float:
     value = number(text)
     if value <= 0:
-        raise ArgumentTypeError(f"{text!r} is not a number of seconds over zero")
+        raise ArgumentTypeError(f"{text!r} is not {wanted}")
     return value
 
 
@@ -278,6 +287,23 @@ def watching(command: ArgumentParser) -> None:
     command.add_argument("--once", action="store_true", help="stop at the end of the file")
     command.add_argument(
         "--json", action="store_true", dest="json_lines", help="one JSON document a line"
+    )
+
+
+def designing(command: ArgumentParser) -> None:
+    """Add the limits of a motion, in the model's units."""
+    for name, unit in (
+        ("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"), ("jerk", "m/s³"),
+    ):  # fmt: skip
+        command.add_argument(
+            f"--{name}", type=positive, required=True, metavar="LIMIT", help=f"to each side, {unit}"
+        )
+    for name, value in (("duration", 10.0), ("interval", 0.002)):
+        command.add_argument(
+            f"--{name}", type=seconds, default=value, metavar="SECONDS", help=f"default: {value:g}"
+        )
+    command.add_argument(
+        "--noise", type=positive, metavar="FORCE", help="of a sample of force (default: 2 %% of it)"
     )
 
 

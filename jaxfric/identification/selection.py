@@ -96,9 +96,9 @@ def select(
             Candidate(name, one.parameters, one.held_out, error, _half(one.held_out, error))
         )
     chosen = _chosen(found)
-    if len(chosen.tied) < 2:
-        return chosen
     speed = spell(VELOCITY, recording.unit_names)
+    if len(chosen.tied) < 2:
+        return chosen._replace(reason=_unseen(chosen.name, standings.recorded(log), speed))
     curves = {name: together[name].curve for name in chosen.tied}
     return chosen._replace(reason=_reason(curves, log, speed, recording.unit_names["force"]))
 
@@ -120,6 +120,16 @@ def _half(held_out: np.ndarray, error: float) -> float:
     count = held_out.size
     spread = np.std(held_out, ddof=1) / np.sqrt(count) / np.mean(held_out)
     return float(0.5 * error * student_quantile(0.975, count - 1) * spread)
+
+
+def _unseen(name: str, slowest: float, speed: str) -> str:
+    """What a model without a bump leaves open."""
+    if not name.endswith("coulomb-viscous"):
+        return ""
+    return (
+        f"whether there is a Stribeck bump below {slowest:.2g} {speed} cannot be told, because no "
+        "motion below that"
+    )
 
 
 def _reason(curves: Mapping[str, np.ndarray], log, speed: str, force: str) -> str:
