@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         export as export,
         fleet as fleet,
         models as models,
+        online as online,
         signals as signals,
         simulators as simulators,
         terms as terms,
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
         explain as explain,
     )
     from .identification import devices as devices
+    from .identification.constant_velocity import (
+        ConstantVelocity as ConstantVelocity,
+        constant_velocity as constant_velocity,
+    )
     from .identification.identified import Identified as Identified, Result as Result
     from .identification.identifying import identify as identify
     from .identification.projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
@@ -41,6 +46,7 @@ _MODULES = {
     "export": "export",
     "fleet": "fleet",
     "models": "models",
+    "online": "online",
     "scenario": "simulation.scenario",
     "signals": "signals",
     "simulators": "simulators",
@@ -50,6 +56,7 @@ _NAMES = {
     "data.io": ("read",),
     "data.recording": ("Recording", "pad", "stack"),
     "explanation": ("Earlier", "Explanation", "explain"),
+    "identification.constant_velocity": ("ConstantVelocity", "constant_velocity"),
     "identification.identified": ("Identified", "Result"),
     "identification.identifying": ("identify",),
     "identification.projections": ("ClosedWindows", "WeakForm"),

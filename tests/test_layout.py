@@ -13,8 +13,8 @@ PACKAGE = Path(__file__).parents[1] / "jaxfric"
 
 # Each room imports only from rooms before it. A new file gets its place here, or the test says so.
 ORDER = """
-    units programs looks data terms signals models checks identification simulation simulators
-    explanation export fleet report validation cli __main__
+    units programs looks data terms signals models checks identification online simulation
+    simulators explanation export fleet report validation cli __main__
 """.split()
 
 GUIDE = Path(__file__).parents[1] / "CONTRIBUTING.md"
@@ -118,7 +118,7 @@ def test_public_names_stay_what_they_are_whatever_was_imported_before():
         "import importlib, pkgutil, types, jaxfric\n"
         "for m in pkgutil.walk_packages(jaxfric.__path__, 'jaxfric.'):\n"
         "    if m.name.split('.')[1] != '__main__': importlib.import_module(m.name)\n"
-        "modules = ('devices', 'export', 'fleet', 'models', 'scenario', 'signals',\n"
+        "modules = ('devices', 'export', 'fleet', 'models', 'online', 'scenario', 'signals',\n"
         "           'simulators', 'terms')\n"
         "hidden = [n for n in jaxfric.__all__ if n not in modules\n"
         "          and isinstance(getattr(jaxfric, n), types.ModuleType)]\n"

@@ -151,6 +151,9 @@ def _parser() -> argparse.ArgumentParser:
         _add_effects,
         _add_fleet,
         _add_prove,
+        _add_design,
+        _add_select,
+        _add_watch,
     ):
         add(commands)
     return parser
@@ -341,3 +344,33 @@ def _add_fleet(commands) -> None:
 
 def _add_prove(commands) -> None:
     options.proving(_add(commands, "prove", "prove.run", "the concealed-effect benchmark"))
+
+
+def _add_design(commands) -> None:
+    command = _add(commands, "design", "design.run", "the motion to record next")
+    command.add_argument(
+        "model", metavar="MODEL.json", help="a model; or an explanation, whose rivals to separate"
+    )
+    options.designing(command)
+    command.add_argument("-o", "--out", type=options.table, required=True, metavar="OUT.csv")
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the prediction; - prints it"
+    )
+
+
+def _add_select(commands) -> None:
+    command = _add(
+        commands, "select", "commands.selection", "which friction model a recording supports"
+    )
+    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write the standings; - prints them"
+    )
+    options.reading(command)
+
+
+def _add_watch(commands) -> None:
+    command = _add(commands, "watch", "watch.run", "parameters and changes as data arrive")
+    command.add_argument("file", metavar="FILE", help="a CSV that grows, or - for standard input")
+    options.watching(command)
+    options.following(command)

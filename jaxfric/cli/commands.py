@@ -16,9 +16,12 @@ from ..data.io import read_with_notes, write_bytes, write_table, write_text
 from ..data.recording import Recording, uniform
 from ..data.writing import csv_text
 from ..identification import documents, tabulate
+from ..identification.constant_velocity import constant_velocity
 from ..identification.identified import Identified
 from ..identification.identifying import identify as identify_recording
 from ..identification.projections import AbstractProjection, ClosedWindows, WeakForm
+from ..identification.selection import Selection
+from ..looks.text import text
 from ..models import Model
 from ..programs import kept_in
 from ..signals import kernel_half_width, prepare
@@ -47,10 +50,6 @@ def fitted(
     bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
-    if model == "best":
-        from ..identification.selection import select
-
-        model = select(recording).name
     with kept_in(programs_folder()):
         log = uniform(recording)
         chosen: AbstractProjection | None = None
@@ -64,6 +63,42 @@ def fitted(
             raise ValueError(f"{recording.source}: {error}") from error
     # Arrays of numpy: taking them apart compiles nothing.
     return model, jax.tree.map(np.asarray, found)
+
+
+def select(recording: Recording, path: str) -> Selection:
+    """The standings of all named models on one recording."""
+    from ..identification.selection import select as select_model
+
+    with kept_in(programs_folder()):
+        try:
+            return select_model(recording)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from error
+
+
+def selection(arguments: Namespace) -> int:
+    """`jaxfric select`: which friction model each recording supports."""
+    done, failures = [], 0
+    for path in arguments.files:
+        show_progress(path)
+        try:
+            recording, _ = read(path, arguments)
+            found = select(recording, path)
+        except (ValueError, OSError) as error:
+            show_progress("")
+            say(f"jaxfric select: {message(error)}", file=sys.stderr)
+            failures += 1
+            continue
+        show_progress("")
+        done.append({"file": path} | found.to_dict())
+        if not _printed(arguments):
+            say(
+                text([[f"{path}:"], *tabulate.standings(done[-1])])
+                + "\n" * (len(arguments.files) > 1)
+            )
+    if arguments.json and done:
+        put(arguments.json, documents.to_json(done if len(arguments.files) > 1 else done[0]))
+    return 2 if failures else 0
 
 
 def programs_folder() -> Path | None:
@@ -104,7 +139,8 @@ def identify(arguments: Namespace) -> int:
 
 def _printed(arguments: Namespace) -> bool:
     """Whether a document goes to standard output, where no table may stand beside it."""
-    return any(path and standard(path) for path in (arguments.json, arguments.save))
+    given = (getattr(arguments, name, None) for name in ("json", "save"))
+    return any(path and standard(path) for path in given)
 
 
 def check_bounds(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
@@ -120,8 +156,14 @@ def check_bounds(model: str, bounds: Mapping[str, tuple[float, float]]) -> None:
 def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
     """The document of one file; its model and picture are written."""
     recording, notes = read(path, arguments)
-    name, found = fitted(recording, arguments.model, arguments.projection, arguments.bounds)
-    document = documents.identification(found, recording, notes) | {"name": name}
+    name, chosen = arguments.model, {}
+    if name == "best":
+        standings = select(recording, path)
+        name, chosen = standings.name, {"selection": standings.to_dict()}
+    name, found = fitted(recording, name, arguments.projection, arguments.bounds)
+    test = constant_velocity(recording, found)
+    document = documents.identification(found, recording, notes, test)
+    document |= {"name": name} | chosen
     if arguments.save or arguments.plot:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")

@@ -165,9 +165,18 @@ def count(text: str) -> int:
 
 def seconds(text: str) -> float:
     """A time span over zero, s."""
+    return _over_zero(text, "a number of seconds over zero")
+
+
+def positive(text: str) -> float:
+    """A number over zero."""
+    return _over_zero(text, "a number over zero")
+
+
+def _over_zero(text: str, wanted: str) -> float:
     value = number(text)
     if value <= 0:
-        raise ArgumentTypeError(f"{text!r} is not a number of seconds over zero")
+        raise ArgumentTypeError(f"{text!r} is not {wanted}")
     return value
 
 
@@ -203,6 +212,30 @@ def sizes(text: str) -> tuple[float, float]:
 
 def reading(command: ArgumentParser) -> None:
     """Add the options that say how to read a file."""
+    group = _columns(command)
+    group.add_argument(
+        "--period",
+        type=factors,
+        default={},
+        metavar="position=NUMBER",
+        help="the position is counted modulo this, before scaling: make it continuous",
+    )
+    group.add_argument(
+        "--rate",
+        type=rate,
+        metavar="HZ",
+        help="samples per second of a file without a time column",
+    )
+    group.add_argument(
+        "--no-repair",
+        action="store_false",
+        dest="repair",
+        help="leave clock, samples and position as they are (not finite samples are masked)",
+    )
+
+
+def _columns(command: ArgumentParser):
+    """The options that say which columns, in which units."""
     group = command.add_argument_group("how to read the file")
     group.add_argument(
         "--columns",
@@ -225,24 +258,67 @@ def reading(command: ArgumentParser) -> None:
         metavar="force=N,position=m",
         help="after scaling; they name, they do not convert",
     )
-    group.add_argument(
-        "--period",
-        type=factors,
-        default={},
-        metavar="position=NUMBER",
-        help="the position is counted modulo this, before scaling: make it continuous",
+    return group
+
+
+def following(command: ArgumentParser) -> None:
+    """Add the options that say how to read a stream."""
+    _columns(command)
+
+
+def watching(command: ArgumentParser) -> None:
+    """Add the options of following a stream."""
+    command.add_argument(
+        "--model",
+        default="coulomb-viscous",
+        metavar="NAME",
+        help="a name that jaxfric models lists (default: coulomb-viscous)",
     )
-    group.add_argument(
-        "--rate",
-        type=rate,
-        metavar="HZ",
-        help="samples per second of a file without a time column",
+    forget = command.add_mutually_exclusive_group()
+    forget.add_argument(
+        "--keep",
+        type=seconds,
+        default=math.inf,
+        metavar="SECONDS",
+        help="slip time of a direction after which a stroke weighs 1/e (default: nothing fades)",
     )
-    group.add_argument(
-        "--no-repair",
-        action="store_false",
-        dest="repair",
-        help="leave clock, samples and position as they are (not finite samples are masked)",
+    forget.add_argument(
+        "--window", type=count, default=0, metavar="N", help="only the last N strokes each way"
+    )
+    command.add_argument(
+        "--every",
+        type=seconds,
+        default=10.0,
+        metavar="SECONDS",
+        help="of the stream's clock, between two lines of parameters (default: 10)",
+    )
+    command.add_argument(
+        "--false-alarms",
+        type=number,
+        default=1e-4,
+        metavar="RATE",
+        help="of the change detection, a stroke of a direction (default: 0.0001)",
+    )
+    command.add_argument("--once", action="store_true", help="stop at the end of the file")
+    command.add_argument(
+        "--json", action="store_true", dest="json_lines", help="one JSON document a line"
+    )
+
+
+def designing(command: ArgumentParser) -> None:
+    """Add the limits of a motion, in the model's units."""
+    for name, unit in (
+        ("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s²"), ("jerk", "m/s³"),
+    ):  # fmt: skip
+        command.add_argument(
+            f"--{name}", type=positive, required=True, metavar="LIMIT", help=f"to each side, {unit}"
+        )
+    for name, value in (("duration", 10.0), ("interval", 0.002)):
+        command.add_argument(
+            f"--{name}", type=seconds, default=value, metavar="SECONDS", help=f"default: {value:g}"
+        )
+    command.add_argument(
+        "--noise", type=positive, metavar="FORCE", help="of a sample of force (default: 2 %% of it)"
     )
 
 

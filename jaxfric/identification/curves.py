@@ -130,7 +130,7 @@ def fastest_speed(model: Any) -> float:
 def _side(found: Any, sign: int, speed: np.ndarray) -> Side:
     velocity = sign * speed
     force = np.asarray(found.model.friction(jnp.asarray(velocity)))
-    return Side(sign, velocity, force, *_band(found, velocity, force))
+    return Side(sign, velocity, force, *band(found, velocity, force))
 
 
 def _bins(speed, force):
@@ -148,8 +148,8 @@ def _bins(speed, force):
     return np.array([speed[group].mean() for group in groups]), mean, spread
 
 
-def _band(found: Any, velocity, force):
-    """Pointwise 95 % band of the friction curve by the delta method.
+def band(found: Any, velocity: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Pointwise 95 % band of the friction curve by the delta method, low and high, N, `(K,)`.
 
     Parameters that are not visible have no part in it.
     """

@@ -10,17 +10,21 @@ from ..data.provenance import versions
 from ..data.recording import Recording
 from ..data.summary import facts
 from ..models import name_of
+from .constant_velocity import ConstantVelocity, remark as contradicts, sentence
 
 IDENTIFICATION = "jaxfric.identification/1"
 
 
 def identification(
-    found: Any, recording: Recording | None = None, notes: Sequence[str] = ()
+    found: Any,
+    recording: Recording | None = None,
+    notes: Sequence[str] = (),
+    test: ConstantVelocity | None = None,
 ) -> dict[str, Any]:
     """An `Identified` as plain data (schema `jaxfric.identification/1`).
 
     **Arguments:** `recording` that it was identified from, with the `notes` of its reader, so that
-    its facts are told as well.
+    its facts are told as well; its constant-velocity `test`, which may warn.
     """
     parameters = {
         name: {
@@ -30,7 +34,10 @@ def identification(
         }
         for name, estimate in found.parameters.items()
     }
-    return {
+    remarks, units = list(found.remarks), dict(found.model.units)
+    if test is not None and (contradiction := contradicts(test, units)):
+        remarks.append(contradiction)
+    document = {
         "schema": IDENTIFICATION,
         "name": name_of(found.model.term),
         "recording": {} if recording is None else facts(recording, notes),
@@ -43,9 +50,12 @@ def identification(
         "result": found.result_name,
         "diagnosis": found.diagnosis,
         "force_error": float(found.force_error),
-        "warnings": [remark.to_dict() for remark in found.remarks],
+        "warnings": [remark.to_dict() for remark in remarks],
         "versions": versions(),
     }
+    if test is not None:
+        document["constant_velocity"] = test.to_dict() | {"summary": sentence(test, units)}
+    return document
 
 
 def saved(model: Any, *recordings: Recording | None) -> dict[str, Any]:

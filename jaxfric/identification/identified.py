@@ -16,6 +16,7 @@ from ..looks.text import Block
 from ..models import Model
 from ..units import VELOCITY, spell
 from . import batch, curves, documents, tabulate, uncertainty
+from .constant_velocity import constant_velocity
 from .uncertainty import Estimate
 
 
@@ -175,7 +176,8 @@ class Identified(eqx.Module):
         """The identified friction over velocity with its 95 % band, by matplotlib.
 
         **Arguments:** `recording` that it was identified from: then the measured force less
-        inertia is drawn beside it, over the recorded speeds; `ax`, matplotlib's axes to draw on.
+        inertia is drawn beside it, over the recorded speeds, and the mean force at constant
+        velocity; `ax`, matplotlib's axes to draw on.
 
         **Returns:** the axes.
 
@@ -190,6 +192,7 @@ class Identified(eqx.Module):
         else:
             prepared = curves.prepared(recording)
             sides = curves.measured(self, prepared, curves.rows(self, prepared))
+            drawing.held(axes, constant_velocity(recording, self))
         drawing.friction(axes, sides, units, spell(VELOCITY, units), curves.name(source))
         return axes
 
@@ -202,7 +205,9 @@ class Identified(eqx.Module):
         """
         if self.covariance.ndim != 2:
             raise ValueError(f"to_dict() is of one identification. {text.A_ROW}")
-        return documents.finite(documents.identification(text.on_host(self), recording))
+        test = None if recording is None else constant_velocity(recording, self)
+        document = documents.identification(text.on_host(self), recording, test=test)
+        return documents.finite(document)
 
     def to_pandas(self):
         """The parameters with their 95 % intervals as a table of pandas.

@@ -10,10 +10,13 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording, require, require_force
-from ..models import Model, named, weighed
+from ..models import Model, named, names, weighed
 from ..terms.base import AbstractTerm
+from ..units import VELOCITY, spell
+from . import standings
 from .identifying import identify
 from .projections import WeakForm
+from .uncertainty import student_quantile
 
 # Each fold is made of this many stretches spread over the record, so that a drift or a trajectory
 # of several parts does not put one part alone into a fold.
@@ -24,20 +27,32 @@ FEWEST = 16
 
 class Candidate(NamedTuple):
     """One model's standing: number of parameters, held-out mean-square force residual of each
-    fold, N², and the root of their mean relative to the force, dimensionless.
+    fold, N², and the root of their mean relative to the force, dimensionless, with half its 95 %
+    interval over the folds.
     """
 
     name: str
     parameters: int
     held_out: np.ndarray
     force_error: float
+    half_width: float = np.nan
 
 
 class Selection(NamedTuple):
-    """The chosen model's name, and all candidates by rising held-out error."""
+    """The chosen model's name, all candidates by rising held-out error, the names of those that
+    cannot be told from the best, and why not.
+    """
 
     name: str
     candidates: tuple[Candidate, ...]
+    tied: tuple[str, ...] = ()
+    reason: str = ""
+
+    def to_dict(self) -> dict:
+        """The standings as plain data."""
+        rows = [c._asdict() | {"held_out": c.held_out.tolist()} for c in self.candidates]
+        return {"model": self.name, "candidates": rows, "tied": list(self.tied),
+                "reason": self.reason}  # fmt: skip
 
 
 def select(
@@ -48,29 +63,47 @@ def select(
 ) -> Selection:
     """The simplest friction model that predicts held-out force as well as the best one does.
 
-    Every candidate is identified by the weak form with one fold of the record left out, and judged
-    on the rows of that fold. Among the candidates whose mean error exceeds the least one by no
+    Every candidate is fitted to the rows of the weak form without those of one fold, and judged
+    on these. Among the candidates whose mean error exceeds the least one by no
     more than one standard error of the difference over the folds, the one with the fewest
     parameters is chosen (the one-standard-error rule, Breiman et al. 1984, on paired differences).
 
     **Arguments:** `recording`, one recording; `candidates`, models by name, or names; by default
-    the named models, each with its own directions and with tied ones; `folds`, at least two.
+    all named models, each with its own directions and with tied ones; `folds`, at least two.
+    Named models share their rows and take a second together; others are identified one by one.
 
     **Raises:** `ValueError` if no candidate could be identified on every fold.
     """
     require(recording, "select", least=FEWEST)
     require_force(recording, "select")
     if candidates is None:
-        stems = ("coulomb-viscous", "gaussian", "lorentzian", "exponential")
-        candidates = (*stems, *(f"symmetric-{stem}" for stem in stems))
-    if not isinstance(candidates, Mapping):
-        candidates = {name: named(name) for name in candidates}
+        candidates = names()
     prepared = signals.prepare(recording)
-    width = signals.kernel_half_width(prepared)
-    fold = _folds(prepared, folds)
-    standings = [
-        _standing(name, term, prepared, width, fold, folds) for name, term in candidates.items()
-    ]
+    if isinstance(candidates, Mapping):
+        width = signals.kernel_half_width(prepared)
+        fold = _folds(prepared, folds)
+        found = [
+            _standing(name, term, prepared, width, fold, folds) for name, term in candidates.items()
+        ]
+        return _chosen(found)
+    for name in candidates:
+        named(name)  # raises for one there is not
+    together, log = standings.all_of(prepared, _stretches(prepared, folds), candidates, folds)
+    found = []
+    for name, one in together.items():
+        error = float(np.sqrt(np.mean(one.held_out) / np.mean(one.size)))
+        found.append(
+            Candidate(name, one.parameters, one.held_out, error, _half(one.held_out, error))
+        )
+    chosen = _chosen(found)
+    speed = spell(VELOCITY, recording.unit_names)
+    if len(chosen.tied) < 2:
+        return chosen._replace(reason=_unseen(chosen.name, standings.recorded(log), speed))
+    curves = {name: together[name].curve for name in chosen.tied}
+    return chosen._replace(reason=_reason(curves, log, speed, recording.unit_names["force"]))
+
+
+def _chosen(standings: Sequence[Candidate]) -> Selection:
     able = sorted((c for c in standings if np.isfinite(c.force_error)), key=lambda c: c.force_error)
     if not able:
         raise ValueError(
@@ -78,7 +111,44 @@ def select(
             "moves. Use fewer folds or a longer recording."
         )
     near = [c for c in able if _excess(c, able[0]) <= 1]
-    return Selection(min(near, key=lambda c: c.parameters).name, tuple(able))
+    simplest = min(near, key=lambda c: c.parameters)
+    return Selection(simplest.name, tuple(able), tuple(c.name for c in near))
+
+
+def _half(held_out: np.ndarray, error: float) -> float:
+    """Half the 95 % interval of the error over the folds: of the mean square, by its root."""
+    count = held_out.size
+    spread = np.std(held_out, ddof=1) / np.sqrt(count) / np.mean(held_out)
+    return float(0.5 * error * student_quantile(0.975, count - 1) * spread)
+
+
+def _unseen(name: str, slowest: float, speed: str) -> str:
+    """What a model without a bump leaves open."""
+    if not name.endswith("coulomb-viscous"):
+        return ""
+    return (
+        f"whether there is a Stribeck bump below {slowest:.2g} {speed} cannot be told, because no "
+        "motion below that"
+    )
+
+
+def _reason(curves: Mapping[str, np.ndarray], log, speed: str, force: str) -> str:
+    """Why models cannot be told apart: they differ only where nothing moved, or hardly at all."""
+    every = np.stack(list(curves.values()))
+    apart = np.max(every, axis=0) - np.min(every, axis=0)  # (2, K)
+    speeds, slowest = standings.curve_speeds(log), standings.recorded(log)
+    within = float(np.max(apart[:, speeds >= slowest]))
+    below = float(np.max(apart[:, speeds < slowest], initial=0.0))
+    names = ", ".join(curves)
+    if below > 2 * within:
+        return (
+            f"cannot tell these apart ({names}), because no motion below {slowest:.2g} {speed}: "
+            f"there their curves differ by up to {below:.2g} {force}, above by {within:.2g} at most"
+        )
+    return (
+        f"cannot tell these apart ({names}): over the speeds recorded their curves differ by "
+        f"{within:.2g} {force} at most, less than the folds differ by"
+    )
 
 
 def _excess(candidate: Candidate, best: Candidate) -> float:
@@ -90,8 +160,11 @@ def _excess(candidate: Candidate, best: Candidate) -> float:
 
 def _folds(recording: Recording, folds: int) -> jax.Array:
     """The fold that each sample belongs to, `(N,)`: stretches of equal length, dealt in turn."""
-    stretch = np.arange(recording.num_samples) * folds * STRETCHES // recording.num_samples
-    return jnp.asarray(stretch % folds)
+    return jnp.asarray(_stretches(recording, folds) % folds)
+
+
+def _stretches(recording: Recording, folds: int) -> np.ndarray:
+    return np.arange(recording.num_samples) * folds * STRETCHES // recording.num_samples
 
 
 def _standing(name, term, recording, width, fold, folds) -> Candidate:
@@ -103,7 +176,8 @@ def _standing(name, term, recording, width, fold, folds) -> Candidate:
     square, size = _judge(found.model, testing, width)
     held_out = np.asarray(square)
     relative = float(np.sqrt(np.mean(held_out) / np.mean(np.asarray(size))))
-    return Candidate(name, len(term.affine) + len(term.nonlinear), held_out, relative)
+    count = len(term.affine) + len(term.nonlinear)
+    return Candidate(name, count, held_out, relative, _half(held_out, relative))
 
 
 @eqx.filter_jit

@@ -57,14 +57,32 @@ def identified(
     """The paragraphs and the table of [`identification`][]; the recording may be absent."""
     result = f"force error {_percent(document['force_error'])}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
+    if said := document.get("constant_velocity", {}).get("summary"):
+        told.append(said)
     if document["result"] != "not_passive":
         told += _remarks(document["parameters"])
+    chosen = standings(document["selection"]) if "selection" in document else []
     return [
         _source(document),
+        *chosen,
         [f"model {document['name']}; {_how(document, automatic)}"],
         _table(document["parameters"], truth),
         told + _closing(document),
     ]
+
+
+def standings(document: Mapping[str, Any]) -> list[Block]:
+    """The table of a selection, by rising held-out error, and why some cannot be told apart."""
+    table = [["", "model", "parameters", "held-out error", "± 95 %"]]
+    for entry in document["candidates"]:
+        name = entry["name"]
+        mark = "*" if name == document["model"] else "=" if name in document["tied"] else ""
+        error, half = f"{entry['force_error']:.3%}", f"{entry['half_width']:.2%}"
+        table.append([mark, name, str(entry["parameters"]), error, half])
+    said = f"* chosen: {document['model']}"
+    if len(document["tied"]) > 1:
+        said += ", the simplest of those as good as the best within one standard error (=)"
+    return [Table(table, (2, 3, 4)), [said, *([document["reason"]] if document["reason"] else [])]]
 
 
 def _percent(share: float) -> str:

@@ -86,6 +86,30 @@ def friction(axes, sides: Sequence[Side], units: Mapping[str, str], speed: str, 
     axes.grid(color="0.93")
 
 
+def held(axes, test: Any) -> None:
+    """The points of a constant-velocity test, and a strip below the speeds that have none.
+
+    **Arguments:** `test`: its `points` and `not_evaluated`, as of `identification`.
+    """
+    if not test.tried:
+        return
+    for wrong, colour, name in (
+        (False, "k", "at constant velocity, 95 %"),
+        (True, "#c00000", "at constant velocity, contradicts"),
+    ):
+        some = [p for p in test.points if p.contradicts is wrong]
+        if some:
+            speed, force = [p.velocity for p in some], np.array([p.force for p in some])
+            reach = np.array([[f - p.low, p.high - f] for f, p in zip(force, some, strict=True)]).T
+            style = {"fmt": "D", "mfc": "w", "ms": 5, "capsize": 3, "lw": 1.2, "zorder": 4}
+            axes.errorbar(speed, force, reach, color=colour, label=name, **style)
+    label: str | None = "not evaluated at constant velocity"
+    for gap in test.not_evaluated:
+        style = {"ymax": 0.025, "color": "0.7", "hatch": "////", "ec": "w", "lw": 0, "zorder": 1}
+        axes.axvspan(gap.low, gap.high, label=label, **style)
+        label = None
+
+
 def plain(words: str) -> str:
     """Text in which matplotlib reads no formula; it comes from files."""
     return words.replace("$", r"\$")

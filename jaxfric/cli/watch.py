@@ -1,0 +1,111 @@
+"""`jaxfric watch`: parameters and changes as data arrive."""
+
+import itertools
+import json
+import math
+import sys
+from argparse import Namespace
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..online import Change, Follower, feed
+from ..units import spell
+from .options import say
+
+
+def run(arguments: Namespace) -> int:
+    """Follow a growing file or standard input until it ends or is interrupted."""
+    if arguments.file == "-":
+        return _follow(sys.stdin, "standard input", arguments)
+    with open(arguments.file, encoding="utf-8-sig") as file:
+        return _follow(feed.growing(file, arguments.once), arguments.file, arguments)
+
+
+def _follow(lines, source: str, arguments: Namespace) -> int:
+    stream = feed.Feed(lines, arguments.columns, arguments.scale, arguments.units, source)
+    samples = iter(stream)
+    start = feed.begin(samples, stream.has_velocity, source)
+    follower = Follower(
+        arguments.model,
+        slowest=start.slowest,
+        fastest=start.fastest,
+        keep=arguments.keep,
+        window=arguments.window,
+        false_alarms=arguments.false_alarms,
+    )
+    told = _Told(follower, stream.units, arguments.json_lines)
+    told.begin(start)
+    moving: Iterator[feed.Moving] = itertools.chain(
+        start.samples, feed.rest(samples, start.derivative)
+    )
+    following, last = -math.inf, math.nan
+    for sample in moving:
+        last = sample.time
+        change = follower.add(*sample)
+        if change:
+            told.change(change)
+        if following == -math.inf:
+            following = sample.time + arguments.every
+        if sample.time >= following:
+            told.parameters(sample.time)
+            following = sample.time + arguments.every
+    told.parameters(last)
+    return 0
+
+
+class _Told:
+    """What is printed: lines for a person, or one JSON document a line."""
+
+    def __init__(self, follower: Follower, units: dict[str, str], plain: bool):
+        self._follower, self._json = follower, plain
+        self._units = {"force": "N", "position": "m"} | units
+        term = follower.term
+        self._spelled = {
+            p.name: spell(p.dimension, self._units) for p in (*term.affine, *term.nonlinear)
+        }
+
+    def _put(self, document: dict, text: str) -> None:
+        if self._json:
+            clean = {k: None if isinstance(v, float) and not math.isfinite(v) else v
+                     for k, v in document.items()}  # fmt: skip
+            print(json.dumps(clean, ensure_ascii=False), flush=True)
+        else:
+            say(text)
+            sys.stdout.flush()
+
+    def begin(self, start: feed.Start) -> None:
+        speed = f"{self._units['position']}/s"
+        self._put(
+            {"event": "start", "slowest": start.slowest, "fastest": start.fastest},
+            f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.fastest:.3g} {speed}",
+        )
+
+    def parameters(self, time: float) -> None:
+        forward, backward = self._follower.strokes
+        if not min(forward, backward):
+            text = f"{time:10.3f} s  no whole stroke in both directions yet"
+            self._put({"event": "waiting", "time": time}, text)
+            return
+        found = self._follower.solution()
+        values = {name: float(v) for name, v in found.model.parameters.items()}
+        shown = "  ".join(f"{n} {v:.5g} {self._spelled[n]}" for n, v in values.items())
+        document = {
+            "event": "parameters",
+            "time": time,
+            "strokes": [forward, backward],
+            "settled": bool(np.asarray(found.settled)),
+            "parameters": values,
+        }
+        self._put(document, f"{time:10.3f} s  {forward}+{backward} strokes  {shown}")
+
+    def change(self, change: Change) -> None:
+        way = "forward" if change.direction > 0 else "backward"
+        more = "more" if change.excess > 0 else "less"
+        share = f" ({abs(change.share):.1%})" if math.isfinite(change.share) else ""
+        size = f"{abs(change.excess):.3g} {self._units['force']}{share}"
+        self._put(
+            {"event": "change", **change._asdict()},
+            f"{change.time:10.3f} s  CHANGE: {size} {more} friction {way}, for "
+            f"{change.strokes} strokes; identifying anew",
+        )

@@ -1,0 +1,98 @@
+"""Motions within limits: multisines that start and end at rest and repeat."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..data.recording import Recording
+
+HARMONICS = 8
+
+
+class Limits(NamedTuple):
+    """The most that a drive may do, to each side: position m, velocity m/s, acceleration m/s²,
+    jerk m/s³; and the motion's duration and sampling interval, s.
+    """
+
+    position: float
+    velocity: float
+    acceleration: float
+    jerk: float
+    duration: float = 10.0
+    interval: float = 0.002
+
+
+class Motion(NamedTuple):
+    """Time s, position m and its three derivatives, each `(N,)`; N from the limits."""
+
+    time: Float[Array, " N"]
+    position: Float[Array, " N"]
+    velocity: Float[Array, " N"]
+    acceleration: Float[Array, " N"]
+    jerk: Float[Array, " N"]
+
+    def recording(self) -> Recording:
+        """The motion as a recording without force."""
+        return Recording(self.time, jnp.zeros_like(self.time), self.position, self.velocity)
+
+
+def multisine(coefficients: Float[Array, "2 H"], limits: Limits) -> Motion:
+    """A sum of cosines and sines, scaled so that it just keeps within all its limits.
+
+    The paper's (28) is the case of one or two sines. Whole periods: v(ti) = v(tf), eq. (14). The
+    scale is fixed by the largest of the samples.
+    """
+    count = round(limits.duration / limits.interval)
+    time = limits.interval * jnp.arange(count + 1, dtype=coefficients.dtype)
+    order = jnp.arange(1, coefficients.shape[1] + 1, dtype=time.dtype)[:, None]
+    rate = 2 * jnp.pi / limits.duration * order
+    cosine, sine = jnp.cos(rate * time[None]), jnp.sin(rate * time[None])
+    a, b = coefficients
+    parts = []
+    for derivative in range(4):
+        # Derivatives turn cosine into −sine and sine into cosine.
+        one = ((cosine, sine), (-sine, cosine), (-cosine, -sine), (sine, -cosine))[derivative]
+        power = rate[:, 0] ** derivative
+        parts.append((a * power) @ one[0] + (b * power) @ one[1])
+    most = (limits.position, limits.velocity, limits.acceleration, limits.jerk)
+    used = jnp.stack([jnp.max(jnp.abs(p)) / m for p, m in zip(parts, most, strict=True)])
+    return Motion(time, *(p / jnp.max(used) for p in parts))
+
+
+def sine(limits: Limits, dtype=float) -> Float[Array, "2 H"]:
+    """The coefficients of the plain sine at the fastest harmonic that uses the whole stroke."""
+    best, most = 1, 0.0
+    for k in range(1, HARMONICS + 1):
+        rate = 2 * jnp.pi * k / limits.duration
+        reach = min(limits.position, limits.velocity / rate, limits.acceleration / rate**2)
+        speed = float(min(reach, limits.jerk / rate**3) * rate)
+        best, most = (k, speed) if speed > 1.001 * most else (best, most)
+    return jnp.zeros((2, HARMONICS), dtype).at[1, best - 1].set(1.0)
+
+
+def descend(cost, start: Float[Array, "2 H"], steps: int, rate: float = 0.05):
+    """Coefficients of the least cost on the way of gradient descent (Adam; Kingma & Ba 2015).
+
+    The gradients are those of coefficients of norm one, as the motion does not depend on the norm.
+    """
+    value = jax.value_and_grad(cost)
+
+    def step(state, i):
+        at, first, second, best, least = state
+        now, slope = value(at)
+        slope = jnp.where(jnp.isfinite(slope), slope, 0.0)
+        best, least = jnp.where(now < least, at, best), jnp.minimum(now, least)
+        first, second = 0.9 * first + 0.1 * slope, 0.999 * second + 0.001 * slope**2
+        count = i.astype(at.dtype) + 1
+        share = first / (1 - 0.9**count)
+        size = jnp.sqrt(second / (1 - 0.999**count)) + 1e-12
+        fade = 0.5 * (1 + jnp.cos(jnp.pi * count / steps))
+        at = at - rate * fade * share / size
+        return (at / jnp.linalg.norm(at), first, second, best, least), None
+
+    zero = jnp.zeros_like(start)
+    begun = (start, zero, zero, start, jnp.full((), jnp.inf, start.dtype))
+    found, _ = jax.lax.scan(step, begun, jnp.arange(steps))
+    return found[3], found[4]

@@ -1,0 +1,6 @@
+"""Friction identified while the axis runs: the second open issue of Kim, Kim & Ha (2004)."""
+
+from .chart import Chart as Chart, threshold as threshold
+from .follower import Change as Change, Follower as Follower
+from .moments import State as State, reference as reference, start as start, update as update
+from .solving import Solution as Solution, solve as solve
