@@ -34,6 +34,16 @@ _LINES = {
         "jaxfric fleet 'logs/**/*.parquet' --out fits.parquet --plot fleet.png",
         "jaxfric fleet logs --model lorentzian --axis axis --out fits.csv",
     ],
+    "select": ["jaxfric select axis.csv --json standings.json"],
+    "watch": [
+        "jaxfric watch growing.csv --keep 600",
+        "logger | jaxfric watch - --window 20 --every 60",
+        "jaxfric watch axis.csv --once --json",
+    ],
+    "design": [
+        "jaxfric design model.json --position 0.1 --velocity 0.12 --acceleration 3 --jerk 300 "
+        "-o motion.csv",
+    ],
     "prove": ["jaxfric prove --cases 24 --jobs 2 --out proof"],
 }
 EXAMPLES = {name: "\n  ".join(["examples:", *lines]) for name, lines in _LINES.items()}
