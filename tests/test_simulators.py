@@ -198,24 +198,23 @@ def swung(model, seed, seconds=12.0):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "moved"),
-    [({}, {}), ({"damping": 0.6}, {"viscous": 0.3}), ({"mass": 1.3}, {"inertia": None})],
+    [({}, None), ({"damping": 0.6}, "joint/elbow/damping"), ({"mass": 1.3}, "body/body1/mass")],
 )
 def test_a_wrong_value_of_a_mujoco_model(change, moved):
     values = {"damping": 0.3, "mass": 1.0}
     plant, nominal = PENDULUM.format(**values | change), PENDULUM.format(**values)
     run, held = swung(plant, 1), swung(plant, 2)
     found = explain(run, Mujoco(nominal), held)
-    if not moved:
+    if moved is None:
         assert found.verdict == "consistent" and found.findings == []
         return
     (finding,) = found.findings
-    names = set(finding.parameters)
-    if "mass" in change:  # a heavier rod has more inertia and more weight
-        assert names == {"inertia", "gravity_cos"}
-        assert float(finding.parameters["inertia"].value) == pytest.approx(0.3 * 0.03, rel=0.1)
-    else:
-        assert names == set(moved)
-        assert float(finding.parameters["viscous"].value) == pytest.approx(0.3, rel=0.01)
+    assert set(finding.parameters) == {moved} and finding.attribute == moved
+    (before,), (after,) = (values[k] for k in change), change.values()
+    own, (kind, owner, what) = finding.parameters[moved], moved.split("/")
+    assert own.before == before and abs(own.value - after) < 3 * own.standard_error + 1e-3
+    assert f"{kind} {owner}: {what} {before:g} → " in finding.sentence
+    assert found.to_dict()["findings"][0]["parameters"][moved]["from"] == before
     errors = found.fit["filtered_holdout_force_error"]
     assert errors["after"] < 0.05 * errors["before"]
 

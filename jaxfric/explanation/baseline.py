@@ -1,6 +1,7 @@
 """What a recording is compared with: a model's name, a model, or another simulator's output."""
 
 import itertools
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -32,13 +33,15 @@ class Mismatch(NamedTuple):
 
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
     `share`: part of the mean-square residual before that the right values remove; `p_value`;
-    `energy`: of the residual before, N².
+    `energy`: of the residual before, N²; `instead`: to each that moved, what would do as
+    well.
     """
 
     moved: dict[int, float]
     share: float
     p_value: float
     energy: float
+    instead: dict[int, tuple[int, ...]] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
 
 
 def baseline_of(given) -> Baseline:
@@ -157,12 +160,13 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
     if share < LEAST_SHARE or p_value > LEVEL:
         return None
     before = [*given.alphas[0], *given.betas[0]]
-    free = _fewest(
-        own, given.residual, block, LINEARITY**2 * float(evidence.force @ evidence.force)
-    )
+    enough = LINEARITY**2 * float(evidence.force @ evidence.force)
+    free = _fewest(own, given.residual, block, enough)
     if not free:
         return None
-    return Mismatch({i: before[i] for i in sorted(free)}, float(share), p_value, given.energy)
+    instead = _instead(own, given.residual, block, free, enough)
+    moved = {i: before[i] for i in sorted(free)}
+    return Mismatch(moved, float(share), p_value, given.energy, instead)
 
 
 def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
@@ -180,16 +184,62 @@ def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float)
     for count in range(1, min(len(used), MOST_WRONG) + 1):
         if most - _taken(gram, pull, found) < enough:
             break
-        better = max(
-            itertools.combinations(range(len(used)), count),
-            key=lambda some: _taken(gram, pull, some),
-        )
+        better = _best(gram, pull, count, found)
         if not _sure(columns[:, better], left, block):
             break
         found = better
     if len(found) == MOST_WRONG and most - _taken(gram, pull, found) >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
+
+
+# Of more subsets than this the best is looked for among those that hold the best of one fewer.
+MOST_SUBSETS = 100_000
+# Beside a diagonal of one; of columns that differ by less the sum is not told from one of them.
+RIDGE = 1e-12
+
+
+def _best(gram: np.ndarray, pull: np.ndarray, count: int, before: tuple[int, ...]):
+    """The subset of that many columns that takes most off the energy."""
+    number = range(len(pull))
+    if math.comb(len(pull), count) <= MOST_SUBSETS:
+        subsets = np.array(list(itertools.combinations(number, count)))
+    else:
+        kept = [[*some, *more] for r in (1, 2) if r <= count
+                for some in itertools.combinations(before, count - r)
+                for more in itertools.combinations(sorted(set(number) - set(some)), r)]  # fmt: skip
+        subsets = np.unique(np.sort(np.array(kept)), axis=0)
+    inner = gram[subsets[:, :, None], subsets[:, None, :]] + RIDGE * np.eye(count)
+    outer = pull[subsets]
+    gains = np.einsum("sk,sk->s", outer, np.linalg.solve(inner, outer[..., None])[..., 0])
+    return tuple(int(i) for i in subsets[int(np.argmax(gains))])
+
+
+def _instead(
+    own: np.ndarray, left: np.ndarray, block: np.ndarray, free: list[int], enough: float
+) -> dict[int, tuple[int, ...]]:
+    """Columns that would do as well in the place of one of those that are free."""
+    found: dict[int, tuple[int, ...]] = {}
+    size = np.linalg.norm(own, axis=0)
+    others = [j for j in range(own.shape[1]) if j not in free and size[j] > 0]
+    noise = left - own[:, free] @ solve(own[:, free], left)
+    if len(free) > MOST_WRONG:
+        return found
+    for i in free:
+        rest = orthonormal(own[:, [j for j in free if j != i]])
+        alike = []
+        for j in others:
+            basis = orthonormal(own[:, [j]], rest)
+            basis = np.concatenate([rest, basis], axis=1)
+            lone = own[:, i] - basis @ (basis.T @ own[:, i])
+            lone = lone / max(float(np.linalg.norm(lone)), 1e-300)
+            part = float(lone @ left)
+            spread = np.bincount(block, lone * noise, int(block[-1]) + 1)
+            if abs(part) <= SURE * float(np.linalg.norm(spread)) or part**2 < enough:
+                alike.append(j)
+        if alike:
+            found[i] = tuple(alike)
+    return found
 
 
 def _taken(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:

@@ -161,11 +161,11 @@ def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -
     held = None
     if asked.held is not None:
         held = verification.share(first, found.base, first, asked.held)
-    text = mismatch_sentence(moved, wrong.share)
-    equation = "θ = θ₀ + Δθ"
+    instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(
-        "parameter_mismatch", equation, text, (), "", moved, wrong.share, held, wrong.p_value
-    )
+        "parameter_mismatch", "θ = θ₀ + Δθ", mismatch_sentence(moved, wrong.share), (), "", moved,
+        wrong.share, held, wrong.p_value, instead=instead,
+    )  # fmt: skip
 
 
 def _shown(places: list[Place], least: float, force: float) -> list[Place]:
