@@ -36,6 +36,8 @@ VALUES = {
     "gain": "gain",
     "stiffness": "joint/first/stiffness",
     "mass": "body/upper/mass",
+    "damping2": "joint/second/damping",
+    "mass2": "body/fore/mass",
 }
 EFFECTS = {
     "cogging": {"cogging", "gravity_unbalance", "position_dependent_friction"},
@@ -65,10 +67,12 @@ def main() -> None:
 def case(seed: int, number: int):
     """One machine: the kind of difference, whether it was told, and what was said, by joint."""
     rng = np.random.default_rng((seed, number))
-    kinds = [*(name for name in VALUES if name != "mass"), *EFFECTS]
+    kinds = ["damping", "friction", "armature", "gain", "stiffness", *EFFECTS]
     kind = "nothing" if number % 3 == 0 else kinds[rng.integers(len(kinds))]
     kind = "mass" if kind == "friction" and number % 2 else kind
     two = bool(rng.random() < 0.4)
+    # Of an arm what its second joint carries.
+    kind = f"{kind}2" if two and kind in ("damping", "mass") and number % 4 > 1 else kind
     values = draw(rng, two)
     plant, extra = dict(values), {}
     size = rng.uniform(0.15, 0.6)
@@ -84,8 +88,8 @@ def case(seed: int, number: int):
     runs = [run(rng, model(plant), values, extra, two) for _ in range(2)]
     nominal = model(values)
     for joint in range(1 + two):
-        if kind != "nothing" and joint == 1:
-            continue  # what was changed is the first joint's
+        if kind != "nothing" and joint != kind.endswith("2"):
+            continue  # what was changed is the other joint's
         name = ("first", "second")[joint]
         logs = [log(r, joint, two, values) for r in runs]
         found = jf.explain(logs[0], jf.simulators.mujoco(nominal, name), logs[1])

@@ -195,11 +195,17 @@ def _add_explain(commands) -> None:
     )
     base.add_argument(
         "--mujoco",
+        "--urdf",
         metavar="MODEL.xml",
-        help="instead: a MuJoCo model or a URDF, whose force along the recorded motion is computed "
-        "(extra: mujoco)",
+        help="instead: a MuJoCo model or a URDF, whose force along the recorded motion is "
+        "computed, for all its joints that the log has (extra: mujoco)",
     )
-    command.add_argument("--joint", metavar="NAME", help="of the model of --mujoco")
+    command.add_argument(
+        "--joint",
+        metavar="NAME",
+        help="one joint of the model of --mujoco; --columns NAME_position=COLUMN,NAME_force=COLUMN "
+        "where names do not speak for themselves",
+    )
     command.add_argument(
         "--simulation-holdout",
         metavar="FILE",
@@ -228,7 +234,11 @@ def _add_explain(commands) -> None:
         "--report", type=options.output, metavar="OUT.html", help="write a page (extra: report)"
     )
     command.add_argument(
-        "--save", type=options.output, metavar="MODEL.json", help="write the improved model"
+        "--save",
+        type=options.output,
+        metavar="MODEL",
+        help="write the improved model (.json); with --mujoco the simulator's own file, put right "
+        "(.xml), and what it has no attribute for as Python beside it",
     )
     options.reading(command)
 

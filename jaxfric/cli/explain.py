@@ -11,14 +11,19 @@ from ..identification import documents, tabulate
 from ..models import Model, load, named
 from ..programs import kept_in
 from ..report import charts, page
-from ..simulators import Known, Mujoco, same_motion
+from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
+from . import robot
 from .commands import programs_folder, put, read
 from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
     """Explain one recording; print it, and write what was asked for."""
+    if arguments.joint and not arguments.mujoco:
+        raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
+    if arguments.mujoco:
+        return robot.run(arguments)
     if arguments.report:
         charts.library()
     recording, notes = read(arguments.file, arguments)
@@ -96,11 +101,7 @@ def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Reco
 
 def _baseline(
     arguments: Namespace, recording: Recording, holdout: Recording | None
-) -> str | Model | Recording | Known | Mujoco:
-    if arguments.joint and not arguments.mujoco:
-        raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
-    if arguments.mujoco:
-        return Mujoco(arguments.mujoco, arguments.joint)
+) -> str | Model | Recording | Known:
     if arguments.simulation:
         return _simulation(arguments, recording, holdout)
     if arguments.simulation_holdout:

@@ -164,9 +164,48 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
     free = _fewest(own, given.residual, block, enough)
     if not free:
         return None
+    free = _different(model, refitted, evidence, block, free)
     instead = _instead(own, given.residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
     return Mismatch(moved, float(share), p_value, given.energy, instead)
+
+
+# Half a 95 % interval in standard errors.
+HALF_WIDTH = 2.0
+
+
+def _different(
+    model: Model, refitted: Fit, evidence: Evidence, block: np.ndarray, free: list[int]
+) -> list[int]:
+    """The wrong values without those that, fitted with the rest, are what they were.
+
+    What a law of the missing physics takes of a value is known once both are fitted together.
+    """
+    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
+    units = dict(model.units)
+    while 1 < len(free) <= MOST_WRONG:
+        now = as_given(model, refitted, evidence, tuple(free))
+        values = spelled.estimates(freed(now, free), block, units)[0]
+        before = [*model.alpha, *model.term.beta()]
+        away = {
+            i: abs(float(values[names[i]].value) - float(before[i]))
+            / float(values[names[i]].standard_error)
+            for i in free
+        }
+        least = min(away, key=lambda i: away[i])
+        if away[least] > HALF_WIDTH:
+            break
+        free = [i for i in free if i != least]
+    return free
+
+
+def freed(now: Fit, free: Iterable[int]) -> Fit:
+    """A fit of whose base only some values were fitted; what stayed has no error."""
+    kept, columns, slopes = set(free), now.columns.copy(), now.slopes.copy()
+    count, searched = len(now.alphas[0]), len(now.betas[0])
+    columns[:, [i for i in range(count) if i not in kept]] = 0.0
+    slopes[:, [i for i in range(searched) if count + i not in kept]] = 0.0
+    return now._replace(columns=columns, slopes=slopes)
 
 
 def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:

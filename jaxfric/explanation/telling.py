@@ -10,7 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
-from .baseline import Baseline, Mismatch
+from .baseline import Baseline, Mismatch, freed
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
 from .curves import curves, unit
@@ -53,7 +53,9 @@ def tell(
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
-    values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
+    values = spelled.estimates(
+        found.last if wrong is None else freed(found.last, wrong.moved), asked.block, units
+    )[0]
     if wrong is not None:
         findings = [_moved(values, wrong, found, first, asked), *findings]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
@@ -139,17 +141,6 @@ def _doubted(verdict: str, remarks: Sequence[Remark]) -> str:
     return (
         "unexplained" if verdict == "consistent" and (doubtful or NOT_BETTER in names) else verdict
     )
-
-
-def _freed(now: Fit, wrong: Mismatch | None) -> Fit:
-    """A fit of whose base only the wrong values were fitted; what stayed has no error."""
-    if wrong is None:
-        return now
-    columns, slopes = now.columns.copy(), now.slopes.copy()
-    count, searched = len(now.alphas[0]), len(now.betas[0])
-    columns[:, [i for i in range(count) if i not in wrong.moved]] = 0.0
-    slopes[:, [i for i in range(searched) if count + i not in wrong.moved]] = 0.0
-    return now._replace(columns=columns, slopes=slopes)
 
 
 def _moved(values, wrong: Mismatch, found: Named, first: Fit, asked: Question) -> Finding:

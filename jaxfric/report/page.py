@@ -26,7 +26,7 @@ _VERDICTS = {
         "Something is missing that no effect of the library accounts for.",
     ),
 }
-_STYLE = """
+STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; background: #fff;
   max-width: 62rem; margin: 0 auto; padding: 1.5rem; }
 h1 { font-size: 1.5rem; margin: 0 0 .2rem; } h2 { font-size: 1.15rem; margin: 2rem 0 .5rem; }
@@ -90,7 +90,7 @@ def render(document: Mapping[str, Any], pictures: Mapping[str, Any] | None = Non
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{escape(file)} – explained by jaxfric</title>
-<style>{_STYLE}</style>
+<style>{STYLE}</style>
 {charts.script() if drawn else ""}
 </head>
 <body>
@@ -98,6 +98,11 @@ def render(document: Mapping[str, Any], pictures: Mapping[str, Any] | None = Non
 </body>
 </html>
 """
+
+
+def verdict_name(verdict: str) -> str:
+    """A verdict as the page calls it."""
+    return _VERDICTS[verdict][0]
 
 
 def _pictures(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str, str]:

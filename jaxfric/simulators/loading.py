@@ -21,10 +21,14 @@ def is_text(model: str | Path) -> bool:
     return str(model).lstrip().startswith("<")
 
 
-def read(mujoco: Any, model: str | Path) -> Any:
-    """The compiled model of a file or of its text."""
+def read(mujoco: Any, model: str | Path, folder: Path | None = None) -> Any:
+    """The compiled model of a file or of its text; `folder`, in which a text's meshes lie."""
     text = str(model)
     try:
+        if is_text(model) and folder is not None:
+            spec = mujoco.MjSpec.from_string(text)
+            spec.modelfiledir = str(folder)
+            return spec.compile()
         if is_text(model):
             return mujoco.MjModel.from_xml_string(text)
         if not Path(text).is_file():

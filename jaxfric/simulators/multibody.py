@@ -29,15 +29,16 @@ class Mujoco(AbstractSimulator):
 
     **Arguments:** `model`: a file (MJCF or URDF) or its text; `joint`: name of the joint that the
     recording is of, where there are several. The positions of the others are channels of the
-    recording by their joints' names, in the model's own units, rad or m.
+    recording by their joints' names, in the model's own units, rad or m; `folder`, in which the
+    meshes of a model that is given as text lie.
 
     **Raises:** `ValueError` for a model that MuJoCo cannot read, for free and ball joints, closed
     loops, and a joint or channel that is not there.
     """
 
-    def __init__(self, model: str | Path, joint: str | None = None):
-        self.mujoco, self.source = library(), model
-        self.model = read(self.mujoco, model)
+    def __init__(self, model: str | Path, joint: str | None = None, folder: Path | None = None):
+        self.mujoco = library()
+        self.model = read(self.mujoco, model, folder)
         self.joints = joints_of(self.mujoco, self.model)
         if joint is None and len(self.joints) > 1:
             raise ValueError(
