@@ -8,6 +8,7 @@ import pytest
 
 from jaxfric import models, terms
 from jaxfric.data.joints import columns_of
+from jaxfric.data.tables import load
 from jaxfric.export.callback import callback
 from jaxfric.simulators import Mujoco
 from jaxfric.simulators.patching import patched
@@ -159,3 +160,68 @@ def test_columns_of_joints_that_are_said():
         columns_of(names, ["shoulder", "elbow"], {"shoulder": "q9"}, "log")
     with pytest.raises(ValueError, match=r"elbow_force=elbow_effort"):
         columns_of(["elbow_pos", "elbow_effort", "elbow_torque"], ["elbow"], {}, "log")
+
+
+# ---- forms in which robots are logged ----
+
+
+def joint_arrays(count=50):
+    time = 0.01 * np.arange(count)
+    return time, np.stack([np.sin(time), np.cos(time)], 1), np.stack([time, 2 * time], 1)
+
+
+def test_arrays_of_all_joints_have_their_names(tmp_path):
+    time, q, tau = joint_arrays()
+    path = tmp_path / "log.npz"
+    np.savez(path, t=time, q=q, tau=tau, joint_names=np.array(["shoulder", "elbow"]))
+    table = load(path)
+    assert set(table.columns) == {"t", "shoulder/q", "elbow/q", "shoulder/tau", "elbow/tau"}
+    np.testing.assert_array_equal(table.columns["elbow/tau"], tau[:, 1])
+    np.savez(path, t=time, q=q, tau=tau)
+    found = columns_of(load(path).columns, ["shoulder", "elbow"], {}, "log")
+    assert found["elbow"] == {"position": "q:2", "force": "tau:2"}
+
+
+@pytest.mark.parametrize("kind", ["SQLITE3", "MCAP"])
+def test_joint_states_of_a_bag(tmp_path, kind):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store, (time, q, tau) = get_typestore(Stores.ROS2_HUMBLE), joint_arrays()
+    header, stamp, state = (
+        store.types[name]
+        for name in (
+            "std_msgs/msg/Header",
+            "builtin_interfaces/msg/Time",
+            "sensor_msgs/msg/JointState",
+        )
+    )
+    path = tmp_path / "bag"
+    plugin = getattr(rosbag2.StoragePlugin, kind)
+    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
+        topic = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for i in range(len(time)):
+            at = 10**18 + round(time[i] * 1e9)
+            own = header(stamp(at // 10**9, at % 10**9), "")
+            message = state(own, ["shoulder", "elbow"], q[i], np.zeros(0), tau[i])
+            writer.write(topic, at + 5, store.serialize_cdr(message, state.__msgtype__))
+    table = load(path)
+    np.testing.assert_allclose(table.columns["time"], time, atol=1e-9)
+    np.testing.assert_array_equal(table.columns["elbow/effort"], tau[:, 1])
+    assert "elbow/velocity" not in table.columns
+    found = columns_of(table.columns, ["shoulder", "elbow"], {}, "bag")
+    assert found["shoulder"] == {"position": "shoulder/position", "force": "shoulder/effort"}
+
+
+def test_without_its_reader_a_bag_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "rosbags", None)
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(ValueError, match=r"jaxfric\[ros\]"):
+        load(tmp_path / "log.mcap")
+
+
+def test_a_damaged_bag_is_refused(tmp_path):
+    pytest.importorskip("rosbags")
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(ValueError, match="no readable bag"):
+        load(tmp_path / "log.mcap")

@@ -179,7 +179,7 @@ def _add_identify(commands) -> None:
 
 def _add_explain(commands) -> None:
     command = _add(commands, "explain", "explain.run", "what a model leaves out of a recording")
-    command.add_argument("file", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    command.add_argument("file", metavar="FILE", help="CSV, Parquet, .mat, .npz, or a bag")
     base = command.add_mutually_exclusive_group()
     base.add_argument(
         "--baseline",
