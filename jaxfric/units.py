@@ -94,6 +94,8 @@ def spell(dimension: Dimension | str, units: dict[str, str] | None = None) -> st
     """
     if isinstance(dimension, str):
         return dimension
+    if dimension == FREQUENCY:
+        return "Hz"
     units = SI | (units or {})
     if dimension == INERTIA:
         if units == SI:
