@@ -16,6 +16,7 @@ from ..identification import documents, tabulate
 from ..programs import kept_in
 from ..report import charts, page, robot
 from ..simulators import Mujoco
+from ..simulators.inverse import Along
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..simulators.patching import folder_of, patched
 from .commands import programs_folder, put, read, show_progress
@@ -83,11 +84,12 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     source: str | Path = arguments.mujoco
     found: list[Joint] = []
     corrected: tuple[str, ...] = ()
+    shared: dict[bytes, Along] = {}
     with kept_in(programs_folder()):
         for name in reversed(chosen):
             show_progress(f"joint {name}")
             hinge = is_hinge(mujoco, model, joints.index(name))
-            one = _joint(name, source, logs, columns, arguments, hinge)
+            one = _joint(name, source, shared, logs, columns, arguments, hinge)
             found.insert(0, one._replace(corrected=corrected))
             if bodies := _bodies(one):
                 changed = patched(mujoco, source, bodies, folder_of(arguments.mujoco))
@@ -102,10 +104,10 @@ def _columns(path: str, joints: list[str], arguments: Namespace) -> dict[str, di
     return columns_of(load(Path(path)).columns, joints, arguments.columns, path)
 
 
-def _joint(name: str, source, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
+def _joint(name: str, source, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
     logs, notes = [], list[str]()
     try:
-        simulator = Mujoco(source, name, folder_of(arguments.mujoco))
+        simulator = Mujoco(source, name, folder_of(arguments.mujoco), shared)
         for path, own in zip(paths, columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)
             logs.append(log)

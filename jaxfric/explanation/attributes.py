@@ -13,6 +13,8 @@ from .sentences import quantity
 MISMATCH = "parameter_mismatch"
 # Corrections that are no attribute by themselves.
 GAIN, CONSTANT = "gain", "offset"
+# More than these no one reads.
+MOST = 4
 STIFFNESS, REFERENCE = "stiffness", "springref"
 
 
@@ -117,6 +119,7 @@ def _doubt(name: str, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, 
     if key in own and own[key].alike:
         texts.append(f"or {' or '.join(own[key].alike)}: no motion of this joint tells them apart")
     if others := instead.get(key):
-        said = " or ".join(str(own[n]) if n in own else "a constant force" for n in others)
+        said = " or ".join(str(own[n]) if n in own else "a constant force" for n in others[:MOST])
+        said += " or others" * (len(others) > MOST)
         texts.append(f"or {said}: this motion cannot tell them apart")
     return f" ({'; '.join(texts)})" if texts else ""

@@ -166,10 +166,15 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
         return None
     free = _different(model, refitted, evidence, block, free)
     instead = _instead(own, given.residual, block, free, enough)
+    if vague := [i for i, others in instead.items() if len(others) > VAGUE * own.shape[1]]:
+        free = [i for i in free if i not in vague] or free
+        instead = _instead(own, given.residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
     return Mismatch(moved, float(share), p_value, given.energy, instead)
 
 
+# What half of all parameters would do as well says nothing of any of them.
+VAGUE = 0.5
 # Half a 95 % interval in standard errors.
 HALF_WIDTH = 2.0
 

@@ -13,6 +13,7 @@ from ..explanation.attributes import CONSTANT, GAIN, MISMATCH
 from ..explanation.errors import through_kernel
 from ..models import Model
 from ..simulators import Mujoco
+from ..simulators.inverse import Along
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
@@ -91,8 +92,12 @@ def patch(
         for joint, model in models.items()
     ]
     errors = {}
+    shared: dict[bytes, Along] = {}
     for joint, told in found.items():
-        pair = Mujoco(source, joint), Mujoco(done.text, joint, folder_of(source))
+        pair = (
+            Mujoco(source, joint, shared=shared),
+            Mujoco(done.text, joint, folder_of(source), shared),
+        )
         errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
     return Patch(done.text, forces, written, left, errors, module)
 

@@ -1,6 +1,7 @@
 """MuJoCo's inverse dynamics along a recorded motion (MuJoCo reads MJCF and URDF)."""
 
 import dataclasses
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -30,14 +31,21 @@ class Mujoco(AbstractSimulator):
     **Arguments:** `model`: a file (MJCF or URDF) or its text; `joint`: name of the joint that the
     recording is of, where there are several. The positions of the others are channels of the
     recording by their joints' names, in the model's own units, rad or m; `folder`, in which the
-    meshes of a model that is given as text lie.
+    meshes of a model that is given as text lie; `shared`, a memory for several joints of one log.
 
     **Raises:** `ValueError` for a model that MuJoCo cannot read, for free and ball joints, closed
     loops, and a joint or channel that is not there.
     """
 
-    def __init__(self, model: str | Path, joint: str | None = None, folder: Path | None = None):
-        self.mujoco = library()
+    def __init__(
+        self,
+        model: str | Path,
+        joint: str | None = None,
+        folder: Path | None = None,
+        shared: dict[bytes, inverse.Along] | None = None,
+    ):
+        self.mujoco, self._source = library(), str(model)
+        self._shared = {} if shared is None else shared
         self.model = read(self.mujoco, model, folder)
         self.joints = joints_of(self.mujoco, self.model)
         if joint is None and len(self.joints) > 1:
@@ -80,15 +88,20 @@ class Mujoco(AbstractSimulator):
 
     def along(self, recording: Recording) -> inverse.Along:
         """What the model says of all joints along a recorded motion."""
-        return inverse.along(self.mujoco, self.model, self.motion(recording))
+        logs = [self._position(recording, name) for name in self.joints]
+        places = [np.asarray(log.position).tobytes() for log in logs]
+        source = self._source.encode()
+        key = hashlib.sha256(
+            b"".join([source, *places, np.asarray(logs[0].time).tobytes()])
+        ).digest()
+        if key not in self._shared:
+            parts = np.array([derived(log) for log in logs])
+            motion = inverse.Motion(*np.moveaxis(parts, 0, -1))
+            self._shared[key] = inverse.along(self.mujoco, self.model, motion)
+        return self._shared[key]
 
-    def motion(self, recording: Recording) -> inverse.Motion:
-        """Position, velocity and acceleration of all joints."""
-        parts = np.array([self._along(recording, name) for name in self.joints])
-        return inverse.Motion(*np.moveaxis(parts, 0, -1))
-
-    def _along(self, recording: Recording, joint: str):
-        """Position, velocity and acceleration of a joint, each `(N,)`."""
+    def _position(self, recording: Recording, joint: str) -> Recording:
+        """The recording with the position of a joint as its own, and nothing derived from it."""
         if joint != self.joint:
             if joint not in recording.channels:
                 raise ValueError(
@@ -104,7 +117,7 @@ class Mujoco(AbstractSimulator):
                 f"{recording.source or 'The recording'} has no position, which a simulator needs. "
                 "Name its column: --columns position=NAME."
             )
-        return derived(dataclasses.replace(recording, velocity=None, channels={}))
+        return dataclasses.replace(recording, velocity=None, channels={})
 
 
 def derived(recording: Recording):
