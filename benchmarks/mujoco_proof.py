@@ -20,21 +20,24 @@ import numpy as np
 import jaxfric as jf
 
 ARM = """<mujoco><option timestep="{step}" integrator="implicitfast"/><worldbody>
-<body><joint name="first" type="{kind}" axis="{axis}" damping="{damping}" frictionloss="{friction}"
- armature="{armature}" stiffness="{stiffness}"/>
+<body name="upper"><joint name="first" type="{kind}" axis="{axis}" damping="{damping}"
+ frictionloss="{friction}" armature="{armature}" stiffness="{stiffness}"/>
 <geom type="capsule" fromto="0 0 0 {length} 0 0" size="0.02" mass="{mass}"/>{second}</body>
 </worldbody></mujoco>"""
-SECOND = """<body pos="{length} 0 0"><joint name="second" axis="0 1 0" damping="{damping2}"
- frictionloss="{friction2}" armature="{armature2}"/>
+SECOND = """<body name="fore" pos="{length} 0 0"><joint name="second" axis="0 1 0"
+ damping="{damping2}" frictionloss="{friction2}" armature="{armature2}"/>
 <geom type="capsule" fromto="0 0 0 {length} 0 0" size="0.02" mass="{mass2}"/></body>"""
 
 # What is done to the plant, and how a right answer names it: wrong values, or an effect.
 VALUES = {
-    "damping": {"viscous"},
-    "friction": {"coulomb"},
-    "armature": {"inertia"},
-    "gain": {"gain"},
-    "stiffness": {"stiffness"},
+    "damping": "joint/first/damping",
+    "friction": "joint/first/frictionloss",
+    "armature": "joint/first/armature",
+    "gain": "gain",
+    "stiffness": "joint/first/stiffness",
+    "mass": "body/upper/mass",
+    "damping2": "joint/second/damping",
+    "mass2": "body/fore/mass",
 }
 EFFECTS = {
     "cogging": {"cogging", "gravity_unbalance", "position_dependent_friction"},
@@ -64,9 +67,12 @@ def main() -> None:
 def case(seed: int, number: int):
     """One machine: the kind of difference, whether it was told, and what was said, by joint."""
     rng = np.random.default_rng((seed, number))
-    kinds = ["nothing", *VALUES, *EFFECTS]
-    kind = "nothing" if number % 3 == 0 else kinds[1 + rng.integers(len(kinds) - 1)]
+    kinds = ["damping", "friction", "armature", "gain", "stiffness", *EFFECTS]
+    kind = "nothing" if number % 3 == 0 else kinds[rng.integers(len(kinds))]
+    kind = "mass" if kind == "friction" and number % 2 else kind
     two = bool(rng.random() < 0.4)
+    # Of an arm what its second joint carries.
+    kind = f"{kind}2" if two and kind in ("damping", "mass") and number % 4 > 1 else kind
     values = draw(rng, two)
     plant, extra = dict(values), {}
     size = rng.uniform(0.15, 0.6)
@@ -82,8 +88,8 @@ def case(seed: int, number: int):
     runs = [run(rng, model(plant), values, extra, two) for _ in range(2)]
     nominal = model(values)
     for joint in range(1 + two):
-        if kind != "nothing" and joint == 1:
-            continue  # what was changed is the first joint's
+        if kind != "nothing" and joint != kind.endswith("2"):
+            continue  # what was changed is the other joint's
         name = ("first", "second")[joint]
         logs = [log(r, joint, two, values) for r in runs]
         found = jf.explain(logs[0], jf.simulators.mujoco(nominal, name), logs[1])
@@ -186,26 +192,39 @@ def outcome(kind: str, plant: dict, values: dict, extra: dict, found) -> str:
     """Right, declared (among what cannot be told apart), or wrong."""
     effects = {finding.effect for finding in found.findings}
     near = {name for finding in found.findings for name in finding.confusable_with}
-    moved = {name: m for f in found.findings if f.effect == "parameter_mismatch"
-             for name, m in f.parameters.items()}  # fmt: skip
+    moved = {name for f in found.findings for name in f.parameters}
     if kind == "nothing":
         return "right" if found.verdict == "consistent" else "wrong"
     if kind in VALUES:
-        if effects == {"parameter_mismatch"} and set(moved) == VALUES[kind]:
-            truth = extra["gain"] - 1 if kind == "gain" else plant[kind] - values[kind]
-            (value,) = moved.values()
-            inside = (
-                abs(float(value.value) - truth) <= 2.5 * float(value.standard_error) + 0.02 * truth
-            )
-            return "right" if inside else "biased"
-        if kind == "stiffness" and "spring" in effects:
-            return "right" if effects == {"spring"} else "beside"
-        return "beside" if VALUES[kind] <= set(moved) or near & {"spring"} else "wrong"
+        return _valued(VALUES[kind], truth_of(kind, plant, values, extra), effects, found)
     if EFFECTS[kind] & effects:
         return "right" if effects <= EFFECTS[kind] | {"parameter_mismatch"} else "beside"
     return (
         "declared" if EFFECTS[kind] & near or kind == "asymmetry" and "offset" in moved else "wrong"
     )
+
+
+def truth_of(kind: str, plant: dict, values: dict, extra: dict) -> float:
+    """The right value of what is wrong."""
+    return extra["gain"] if kind == "gain" else plant[kind]
+
+
+def _valued(name: str, truth: float, effects: set, found) -> str:
+    """Right; biased, beyond its interval; declared, as what this motion cannot tell from it."""
+    if effects != {"parameter_mismatch"}:
+        return "wrong" if "parameter_mismatch" not in effects else "beside"
+    (finding,) = found.findings
+    if set(finding.parameters) != {name}:
+        alone = len(finding.parameters) == 1
+        near = {other for others in finding.instead.values() for other in others}
+        kind, _, what = name.partition("/")
+        owner, _, what = what.partition("/")
+        same = f"{what} of {kind} {owner}" in finding.sentence
+        return "declared" if alone and (name in near or same) else "beside"
+    (value,) = finding.parameters.values()
+    away = abs(float(value.value) - truth)
+    moved = abs(truth - value.before)
+    return "right" if away <= 2.5 * float(value.standard_error) + 0.02 * moved else "biased"
 
 
 def said(found) -> str:

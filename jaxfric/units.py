@@ -84,14 +84,18 @@ def is_rotary(units: dict[str, str]) -> bool:
     return units["position"] in ("rad", "deg", "rev") or units["force"] in _ROTARY_FORCES
 
 
-def spell(dimension: Dimension, units: dict[str, str] | None = None) -> str:
+def spell(dimension: Dimension | str, units: dict[str, str] | None = None) -> str:
     """The unit of a dimension, in the names of a recording.
 
-    **Arguments:** `dimension`, exponents of force, position, time; `units`, the names of the
-    force and the position unit (default newton and metre).
+    **Arguments:** `dimension`, exponents of force, position, time, or a unit's own name; `units`,
+    the names of the force and the position unit (default newton and metre).
 
     **Returns:** for instance `"N·s/m"`; `"kg"` and `"kg·m²"` where the names allow it.
     """
+    if isinstance(dimension, str):
+        return dimension
+    if dimension == FREQUENCY:
+        return "Hz"
     units = SI | (units or {})
     if dimension == INERTIA:
         if units == SI:

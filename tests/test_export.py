@@ -320,6 +320,23 @@ def test_what_a_joint_lacks_is_counted_and_said():
     assert [entry.split(":")[0] for entry in found.left_out] == ["cogging", "offset"]
 
 
+@pytest.mark.parametrize(
+    ("terms_", "values"),
+    [
+        (terms.Coulomb() + terms.Offset(), {"coulomb": 0.2, "offset": -0.9}),
+        (terms.Directional(terms.Coulomb()), {"coulomb+": -0.7, "coulomb-": 1.1}),
+    ],
+)
+def test_a_spring_rests_where_the_constant_force_says(terms_, values):
+    """Whether a model holds the constant of a spring as an offset or between directions."""
+    known = models.from_parameters(terms_ + terms.Spring(), values | {"stiffness": 3.0})
+    found = export(known, "mujoco", position=(-1.0, 1.0))
+    assert float(joint_of(found.text)["springref"]) == pytest.approx(0.3)
+    assert float(joint_of(found.text)["frictionloss"]) == pytest.approx(0.2)
+    assert found.force_error.relative < 1e-9 and not found.left_out
+    assert any("rests at 0.3" in remark for remark in found.remarks)
+
+
 def test_a_spring_is_part_of_a_joint_where_the_target_has_one():
     known = models.from_parameters(
         terms.Coulomb() + terms.Spring(0.3), {"coulomb": 5.0, "stiffness": 7.0}

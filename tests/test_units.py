@@ -22,7 +22,7 @@ SERVO = {"force": "A", "position": "rev"}
         (units.POSITION, "m", "rad", "rev"),
         (units.TIME, "s", "s", "s"),
         (units.VELOCITY, "m/s", "rad/s", "rev/s"),
-        (units.FREQUENCY, "1/s", "1/s", "1/s"),
+        (units.FREQUENCY, "Hz", "Hz", "Hz"),
         (units.STIFFNESS, "N/m", "N·m/rad", "A/rev"),
         (units.DAMPING, "N·s/m", "N·m·s/rad", "A·s/rev"),
         (units.INERTIA, "kg", "kg·m²", "A·s²/rev"),

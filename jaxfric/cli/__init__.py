@@ -208,7 +208,7 @@ def _add_identify(commands) -> None:
 
 def _add_explain(commands) -> None:
     command = _add(commands, "explain", "explain.run", "what a model leaves out of a recording")
-    command.add_argument("file", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    command.add_argument("file", metavar="FILE", help="CSV, Parquet, .mat, .npz, or a bag")
     base = command.add_mutually_exclusive_group()
     base.add_argument(
         "--baseline",
@@ -225,11 +225,17 @@ def _add_explain(commands) -> None:
     )
     base.add_argument(
         "--mujoco",
+        "--urdf",
         metavar="MODEL.xml",
-        help="instead: a MuJoCo model or a URDF, whose force along the recorded motion is computed "
-        "(extra: mujoco)",
+        help="instead: a MuJoCo model or a URDF, whose force along the recorded motion is "
+        "computed, for all its joints that the log has (extra: mujoco)",
     )
-    command.add_argument("--joint", metavar="NAME", help="of the model of --mujoco")
+    command.add_argument(
+        "--joint",
+        metavar="NAME",
+        help="one joint of the model of --mujoco; --columns NAME_position=COLUMN,NAME_force=COLUMN "
+        "where names do not speak for themselves",
+    )
     command.add_argument(
         "--simulation-holdout",
         metavar="FILE",
@@ -258,7 +264,11 @@ def _add_explain(commands) -> None:
         "--report", type=options.output, metavar="OUT.html", help="write a page (extra: report)"
     )
     command.add_argument(
-        "--save", type=options.output, metavar="MODEL.json", help="write the improved model"
+        "--save",
+        type=options.output,
+        metavar="MODEL",
+        help="write the improved model (.json); with --mujoco the simulator's own file, put right "
+        "(.xml), and what it has no attribute for as Python beside it",
     )
     options.reading(command)
 

@@ -339,3 +339,10 @@ def models(arguments: Namespace) -> int:
     """`jaxfric models`: names and equations."""
     say(tabulate.models())
     return 0
+
+
+def today() -> str:
+    """The date in universal time; that of SOURCE_DATE_EPOCH, where a build is to be repeated."""
+    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = int(stamp) if stamp.isdecimal() else time.time()
+    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d")

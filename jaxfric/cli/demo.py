@@ -9,7 +9,7 @@ from ..identification import documents, tabulate
 from ..report import page, pictures
 from ..validation import concealed
 from . import commands
-from .explain import today
+from .commands import today
 from .options import say
 
 # One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.

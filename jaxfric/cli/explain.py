@@ -1,10 +1,7 @@
 """`jaxfric explain`: what a model leaves out of a recording."""
 
 import dataclasses
-import os
-import time
 from argparse import Namespace
-from datetime import UTC, datetime
 from pathlib import Path
 
 from ..data.provenance import sha256
@@ -15,14 +12,19 @@ from ..identification import documents, tabulate
 from ..models import Model, load, named
 from ..programs import kept_in
 from ..report import page
-from ..simulators import Known, Mujoco, same_motion
+from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
-from .commands import programs_folder, put, read, working
+from . import robot
+from .commands import programs_folder, put, read, today, working
 from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
     """Explain one recording; print it, and write what was asked for."""
+    if arguments.joint and not arguments.mujoco:
+        raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
+    if arguments.mujoco:
+        return robot.run(arguments)
     if arguments.report:
         page.library()
     recording, notes = read(arguments.file, arguments)
@@ -45,7 +47,7 @@ def run(arguments: Namespace) -> int:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()
     document["recording"]["notes"] = notes
-    for path in (arguments.baseline, arguments.simulation, arguments.mujoco):
+    for path in (arguments.baseline, arguments.simulation):
         if path and (digest := sha256(path)):
             document["baseline"] |= {"file": path, "sha256": digest}
     texts = written(found, document, arguments, (recording, holdout))
@@ -69,13 +71,6 @@ def written(
     if arguments.report:
         texts[arguments.report] = page.render(document, found.curves, arguments.typed, today())
     return texts
-
-
-def today() -> str:
-    """The date in universal time; that of SOURCE_DATE_EPOCH, where a build is to be repeated."""
-    stamp = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = int(stamp) if stamp.isdecimal() else time.time()
-    return datetime.fromtimestamp(moment, UTC).strftime("%Y-%m-%d")
 
 
 def _simulation(
@@ -117,11 +112,7 @@ def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Reco
 
 def _baseline(
     arguments: Namespace, recording: Recording, holdout: Recording | None
-) -> str | Model | Recording | Earlier | Known | Mujoco:
-    if arguments.joint and not arguments.mujoco:
-        raise ValueError("--joint names a joint of the model of --mujoco, which is not given.")
-    if arguments.mujoco:
-        return Mujoco(arguments.mujoco, arguments.joint)
+) -> str | Model | Recording | Earlier | Known:
     if arguments.simulation:
         return _simulation(arguments, recording, holdout)
     if arguments.simulation_holdout:

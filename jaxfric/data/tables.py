@@ -1,4 +1,4 @@
-"""Files to named columns: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`."""
+"""Files to named columns: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`, robots' bags."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from . import bags
 from .delimited import Table, arrow_column, read_csv, unique
 
 
@@ -28,14 +29,16 @@ def load(path: Path, format: str | None = None) -> Table:
     if its format needs a library that is not installed.
     """
     suffix = (format or path.suffix).lower().lstrip(".")
+    if path.is_dir() and bags.is_bag(path):
+        suffix = bags.SUFFIXES[0]
     if suffix not in _LOADERS:
         raise ValueError(
             f"{path}: the format {suffix or '(no suffix)'!r} is not known. Known are "
             f"{', '.join(sorted(_LOADERS))}; name one with format=."
         )
-    if path.is_dir():
+    if path.is_dir() and not bags.is_bag(path):
         raise ValueError(f"{path}: is a folder; name a file in it.")
-    if not path.is_file():
+    if not path.is_file() and not bags.is_bag(path):
         special = "is no regular file; save its content as one" if path.exists() else ""
         raise ValueError(f"{path}: {special or 'there is no such file'}.")
     if path.stat().st_size == 0:
@@ -136,12 +139,36 @@ def _hdf5(group: Any, h5py: Any, above: tuple, place: str, notes: list[str]) -> 
     return content
 
 
+def _read_bag(path: Path) -> Table:
+    bags.library(path)
+    with _damage(path, "bag"):
+        found = bags.states(path)
+    return bags.table(path, found)
+
+
+def _named(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Arrays `(T, joints)` with the joints' names, where an array of as many names is beside them:
+    `elbow/q` instead of `q:2`.
+    """
+    lists = {k: v for k, v in content.items() if v.ndim == 1 and v.dtype.kind == "U"}
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        names = [v for v in lists.values() if value.ndim == 2 and len(v) == value.shape[1]]
+        if len(names) == 1 and len(set(names[0])) == len(names[0]):
+            found |= {f"{name}/{key}": value[:, j] for j, name in enumerate(names[0].tolist())}
+        else:
+            found[key] = value
+    matched = len(found) > len(content)
+    return {k: v for k, v in found.items() if not (matched and k in lists)}
+
+
 def _read_npz(path: Path) -> Table:
     with _damage(path, "NumPy .npz"), path.open("rb") as file:
         content = np.load(file, allow_pickle=False)
         if isinstance(content, np.ndarray):
             raise ValueError("it holds one array without a name, as .npy files do")
-        return Table(_vectors("", {key: content[key] for key in content.files}), 1, [])
+        arrays = {key: content[key] for key in content.files}
+        return Table(_vectors("", _named(arrays)), 1, [])
 
 
 _LOADERS: dict[str, Callable[[Path], Table]] = {
@@ -151,4 +178,5 @@ _LOADERS: dict[str, Callable[[Path], Table]] = {
     "parquet": _read_parquet,
     "mat": _read_mat,
     "npz": _read_npz,
+    **dict.fromkeys(bags.SUFFIXES, _read_bag),
 }

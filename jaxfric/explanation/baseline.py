@@ -1,6 +1,7 @@
 """What a recording is compared with: a model's name, a model, or another simulator's output."""
 
 import itertools
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -41,7 +42,7 @@ class Mismatch(NamedTuple):
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
     `share`: part of the mean-square residual before that the right values remove; `p_value`;
     `energy`: of the residual before, N²; `within`: numbers of those that move with the others, by
-    no more than is uncertain.
+    no more than is uncertain; `instead`: to each that moved, what would do as well.
     """
 
     moved: dict[int, float]
@@ -49,6 +50,7 @@ class Mismatch(NamedTuple):
     p_value: float
     energy: float
     within: frozenset[int] = frozenset()
+    instead: dict[int, tuple[int, ...]] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
 
 
 def baseline_of(given) -> Baseline:
@@ -160,12 +162,57 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
     if share < LEAST_SHARE or p_value > LEVEL:
         return None
     before = [*given.alphas[0], *given.betas[0]]
-    free = _fewest(
-        own, given.residual, block, LINEARITY**2 * float(evidence.force @ evidence.force)
-    )
+    enough = LINEARITY**2 * float(evidence.force @ evidence.force)
+    free = _fewest(own, given.residual, block, enough)
     if not free:
         return None
-    return Mismatch({i: before[i] for i in sorted(free)}, float(share), p_value, given.energy)
+    free = _different(model, refitted, evidence, block, free)
+    instead = _instead(own, given.residual, block, free, enough)
+    if vague := [i for i, others in instead.items() if len(others) > VAGUE * own.shape[1]]:
+        free = [i for i in free if i not in vague] or free
+        instead = _instead(own, given.residual, block, free, enough)
+    moved = {i: before[i] for i in sorted(free)}
+    return Mismatch(moved, float(share), p_value, given.energy, instead)
+
+
+# What half of all parameters would do as well says nothing of any of them.
+VAGUE = 0.5
+# Half a 95 % interval in standard errors.
+HALF_WIDTH = 2.0
+
+
+def _different(
+    model: Model, refitted: Fit, evidence: Evidence, block: np.ndarray, free: list[int]
+) -> list[int]:
+    """The wrong values without those that, fitted with the rest, are what they were.
+
+    What a law of the missing physics takes of a value is known once both are fitted together.
+    """
+    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
+    units = dict(model.units)
+    while 1 < len(free) <= MOST_WRONG:
+        now = as_given(model, refitted, evidence, tuple(free))
+        values = spelled.estimates(freed(now, free), block, units)[0]
+        before = [*model.alpha, *model.term.beta()]
+        away = {
+            i: abs(float(values[names[i]].value) - float(before[i]))
+            / float(values[names[i]].standard_error)
+            for i in free
+        }
+        least = min(away, key=lambda i: away[i])
+        if away[least] > HALF_WIDTH:
+            break
+        free = [i for i in free if i != least]
+    return free
+
+
+def freed(now: Fit, free: Iterable[int]) -> Fit:
+    """A fit of whose base only some values were fitted; what stayed has no error."""
+    kept, columns, slopes = set(free), now.columns.copy(), now.slopes.copy()
+    count, searched = len(now.alphas[0]), len(now.betas[0])
+    columns[:, [i for i in range(count) if i not in kept]] = 0.0
+    slopes[:, [i for i in range(searched) if count + i not in kept]] = 0.0
+    return now._replace(columns=columns, slopes=slopes)
 
 
 def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
@@ -183,16 +230,62 @@ def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float)
     for count in range(1, min(len(used), MOST_WRONG) + 1):
         if most - _taken(gram, pull, found) < enough:
             break
-        better = max(
-            itertools.combinations(range(len(used)), count),
-            key=lambda some: _taken(gram, pull, some),
-        )
+        better = _best(gram, pull, count, found)
         if not _sure(columns[:, better], left, block):
             break
         found = better
     if len(found) == MOST_WRONG and most - _taken(gram, pull, found) >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
+
+
+# Of more subsets than this the best is looked for among those that hold the best of one fewer.
+MOST_SUBSETS = 100_000
+# Beside a diagonal of one; of columns that differ by less the sum is not told from one of them.
+RIDGE = 1e-12
+
+
+def _best(gram: np.ndarray, pull: np.ndarray, count: int, before: tuple[int, ...]):
+    """The subset of that many columns that takes most off the energy."""
+    number = range(len(pull))
+    if math.comb(len(pull), count) <= MOST_SUBSETS:
+        subsets = np.array(list(itertools.combinations(number, count)))
+    else:
+        kept = [[*some, *more] for r in (1, 2) if r <= count
+                for some in itertools.combinations(before, count - r)
+                for more in itertools.combinations(sorted(set(number) - set(some)), r)]  # fmt: skip
+        subsets = np.unique(np.sort(np.array(kept)), axis=0)
+    inner = gram[subsets[:, :, None], subsets[:, None, :]] + RIDGE * np.eye(count)
+    outer = pull[subsets]
+    gains = np.einsum("sk,sk->s", outer, np.linalg.solve(inner, outer[..., None])[..., 0])
+    return tuple(int(i) for i in subsets[int(np.argmax(gains))])
+
+
+def _instead(
+    own: np.ndarray, left: np.ndarray, block: np.ndarray, free: list[int], enough: float
+) -> dict[int, tuple[int, ...]]:
+    """Columns that would do as well in the place of one of those that are free."""
+    found: dict[int, tuple[int, ...]] = {}
+    size = np.linalg.norm(own, axis=0)
+    others = [j for j in range(own.shape[1]) if j not in free and size[j] > 0]
+    noise = left - own[:, free] @ solve(own[:, free], left)
+    if len(free) > MOST_WRONG:
+        return found
+    for i in free:
+        rest = orthonormal(own[:, [j for j in free if j != i]])
+        alike = []
+        for j in others:
+            basis = orthonormal(own[:, [j]], rest)
+            basis = np.concatenate([rest, basis], axis=1)
+            lone = own[:, i] - basis @ (basis.T @ own[:, i])
+            lone = lone / max(float(np.linalg.norm(lone)), 1e-300)
+            part = float(lone @ left)
+            spread = np.bincount(block, lone * noise, int(block[-1]) + 1)
+            if abs(part) <= SURE * float(np.linalg.norm(spread)) or part**2 < enough:
+                alike.append(j)
+        if alike:
+            found[i] = tuple(alike)
+    return found
 
 
 def _taken(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:

@@ -220,7 +220,7 @@ def not_better(gone: tuple[str, ...], before: Any, spoilt: Any) -> Remark:
     changes = [
         f"{figures[name]} from {getattr(before, name):.2%} to {getattr(spoilt, name):.2%}"
         for name in which[:2]
-    ]
+    ] or ["the force error up over the samples in which it moves"]
     return Remark(
         NOT_BETTER,
         f"The structure that was seen has the shape of {names}, but with that the model is worse: "

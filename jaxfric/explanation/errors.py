@@ -2,15 +2,19 @@
 
 from typing import Any
 
+import jax
 import numpy as np
 
+from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
-from .figures import Figures
+from .baseline import at_values
+from .evidence import gather
+from .figures import Figures, cast
 from .improvement import Improved
 from .naming import Named
 from .predictions import with_predictions
-from .question import Question
+from .question import Question, from_position
 from .regression import Fit, fit
 
 
@@ -47,7 +51,8 @@ def document(
         "holdout_refitted_error": refitted,
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach),
-        "filtered_force_error": filtered["force_error"] | {"width": reach},
+        "filtered_force_error": filtered["force_error"]
+        | {"width": reach, "force_taken_later": asked.delay},
         "filtered_holdout_force_error": filtered["holdout_force_error"],
         "filtered_holdout_refitted_error": filtered_refitted,
         "filtered_noise_floor": filtered["noise_floor"],
@@ -78,3 +83,11 @@ def _adjusted(better: Improved) -> dict[str, list[str]]:
         elif not np.array_equal(kept[id(term)], alpha):
             said["rephased"].append(taken.trial.candidate.effect.name)
     return said
+
+
+def through_kernel(model: Model, recording: Recording, delay: float = 0.0) -> float:
+    """A model's force error through the kernel, at its own values; `delay` as `gather` takes it."""
+    with jax.enable_x64(True):
+        evidence = gather(from_position(cast(recording)), delay=delay)
+        given = at_values(cast(model), evidence)
+    return float(np.sqrt(given.energy / float(evidence.force @ evidence.force)))

@@ -20,7 +20,14 @@ import numpy as np
 
 from .. import programs, signals
 from ..data.recording import Recording, pad
-from ..terms import KNOWN_FORCE, DryCompliance, ElasticBacklash
+from ..terms import (
+    KNOWN,
+    KNOWN_FORCE,
+    KNOWN_MOMENTUM,
+    KNOWN_REST,
+    DryCompliance,
+    ElasticBacklash,
+)
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -118,7 +125,16 @@ def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
         return 1.0
 
     form = _renumbered(term, take)
+    motion = _without_known(motion, term.coordinates)
     return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
+
+
+def _without_known(motion: Recording, kept: frozenset[str] = frozenset()) -> Recording:
+    """A motion without what a simulator says of it, for which nothing is to be compiled anew."""
+    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN) or k in kept}
+    if len(channels) == len(motion.channels):
+        return motion
+    return dataclasses.replace(motion, channels=channels)
 
 
 def _columns(form, betas, numbers, motion):
@@ -186,7 +202,7 @@ def gather(
     count = recording.num_samples
     prepared, smoothed = lengthened(recording)
     width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
-    limits = Scales(*(float(x) for x in _scales(prepared)))
+    limits = Scales(*(float(x) for x in _scales(_without_known(prepared))))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
     reach = step * NODES * limits.interval
@@ -206,9 +222,13 @@ def gather(
     motion = _padded(parts, prepared)
     centre = index[rows, NODES]
     force = np.sum(average * parts["force"][index], axis=1)[rows]
-    known = parts.get(f"channel {KNOWN_FORCE}")
+    whole_known = KNOWN_FORCE if KNOWN_MOMENTUM not in recording.channels else KNOWN_REST
+    known = parts.get(f"channel {whole_known}")
     target = force if known is None else force - np.sum(average * known[index], axis=1)[rows]
     average, slope = _averaged(average), _averaged(slope)
+    if known is not None and whole_known == KNOWN_REST:
+        moving_known = parts[f"channel {KNOWN_MOMENTUM}"]
+        target = target - np.sum(slope * moving_known[index], axis=1)[rows]
     pads = motion.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
     return Evidence(
@@ -235,11 +255,13 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
     """
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
-    padded = pad(nameless, _length(recording.num_samples))
-    if padded.velocity is not None:
-        return padded, 0.0
-    choice = signals.choose(padded)
-    return signals.prepare(padded, choice), signals.smoothing(choice)
+    bare = _without_known(nameless)
+    padded, whole = (pad(log, _length(recording.num_samples)) for log in (bare, nameless))
+    smoothed = 0.0
+    if padded.velocity is None:
+        choice = signals.choose(padded)
+        padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
+    return dataclasses.replace(padded, channels=whole.channels), smoothed
 
 
 _scales = programs.kept(signals.scales)
@@ -299,11 +321,13 @@ def _node_signals(
     # and the columns' weights take it off again, so that force and columns are averaged alike. So
     # is what the derivative took off the velocity, which would look like a load on a spring.
     inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    for name in set(means) - {"force", f"channel {KNOWN_FORCE}", "time", "elapsed"}:
+    forces = {"force", f"channel {KNOWN_FORCE}", f"channel {KNOWN_REST}"}
+    for name in set(means) - forces - {"time", "elapsed"}:
         values = means[name]
         bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
         means[name] = values.copy()
-        lost = 1 / 12 + (smoothed / step**2 if name == "velocity" else 0.0)
+        derived = name == "velocity" or name.endswith("momentum")
+        lost = 1 / 12 + (smoothed / step**2 if derived else 0.0)
         means[name][inner] -= lost * bend
     return means | {"run": label}
 

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from html import escape
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,6 +65,8 @@ class Finding(NamedTuple):
     - `share`: part of the baseline's mean-square residual that it removes; `holdout_share`: the
       same on the held-out recording, `None` without one or where the effect is of the moment.
     - `p_value`: paid for by the number of terms tried.
+    - `attribute`: the simulator's own name for it, where there is one; `instead`: to each wrong
+      value by name, others that this motion cannot tell from it.
     """
 
     effect: str
@@ -75,6 +78,8 @@ class Finding(NamedTuple):
     share: float
     holdout_share: float | None
     p_value: float
+    attribute: str | None = None
+    instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -135,6 +140,7 @@ class Explanation:
             "findings": [
                 {**finding._asdict(), "parameters": _estimates(finding.parameters)}
                 | {"confusable_with": list(finding.confusable_with)}
+                | {"instead": {name: list(others) for name, others in finding.instead.items()}}
                 for finding in self.findings
             ],
             "fit": self.fit,

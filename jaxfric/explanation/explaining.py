@@ -13,10 +13,11 @@ from ..data.recording import Recording, check_same_units, require, require_force
 from ..identification.identified import Identified
 from ..models import NAMED, Model, named
 from ..simulation.prediction import outliers, unseen
-from ..simulators import Known, same_motion
-from ..terms import KNOWN_FORCE
+from ..simulators import AbstractSimulator, Known, same_motion
+from ..terms import KNOWN, KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, threads, verification
+from .attributes import in_own_words
 from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
 from .candidates import OF_THE_MOMENT
 from .contest import Contest, contest
@@ -37,7 +38,13 @@ from .views import weightless
 
 def explain(
     recording: Recording,
-    baseline: str | AbstractTerm | Model | Identified | Recording | Earlier = "gaussian",
+    baseline: str
+    | AbstractTerm
+    | Model
+    | Identified
+    | Recording
+    | Earlier
+    | AbstractSimulator = "gaussian",
     holdout: Recording | None = None,
     *,
     fixed: bool = False,
@@ -75,6 +82,7 @@ def explain(
     for other in (holdout, known):
         if isinstance(other, Recording):
             check_same_units(recording, other)
+    own = baseline.attributes() if isinstance(baseline, AbstractSimulator) else {}
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
     if isinstance(baseline, Earlier):
         baseline = baseline.recording
@@ -98,7 +106,8 @@ def explain(
     for name in unseen(values, recording):
         values[name] = values[name]._replace(value=np.float64(np.nan))
     held_out = None if holdout is None else facts(holdout)
-    return dataclasses.replace(told, **models, baseline_parameters=values, holdout=held_out)
+    told = dataclasses.replace(told, **models, baseline_parameters=values, holdout=held_out)
+    return in_own_words(told, own) if own else told
 
 
 def _as_seen(model: Model, recording: Recording) -> Model:
@@ -117,12 +126,13 @@ def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bo
         baseline is make for make in NAMED.values()
     ):  # the function that makes a model, not called
         baseline = baseline()
-    if callable(baseline) and not isinstance(baseline, type | Model | Identified | AbstractTerm):
+    given_as = type | Model | Identified | AbstractTerm | AbstractSimulator
+    if callable(baseline) and not isinstance(baseline, given_as):
         baseline = Known(baseline)
-    if isinstance(baseline, Known):
+    if isinstance(baseline, AbstractSimulator):
         held = None if holdout is None else baseline.beside(holdout, held_out=True)
         recording = baseline.beside(recording)
-        return recording, baseline.model(recording.units), held, True
+        return recording, baseline.baseline(recording.units), held, True
     given = baseline.model if isinstance(baseline, Identified) else baseline
     term = given.term if isinstance(given, Model) else given
     if isinstance(term, AbstractTerm) and KNOWN_FORCE in term.coordinates:
@@ -133,7 +143,7 @@ def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bo
 
 def _alone(recording: Recording) -> Recording:
     """The recording without another simulator's force, which this baseline does not stand on."""
-    channels = {k: v for k, v in recording.channels.items() if k != KNOWN_FORCE}
+    channels = {k: v for k, v in recording.channels.items() if not k.startswith(KNOWN)}
     return dataclasses.replace(recording, channels=channels)
 
 

@@ -139,10 +139,10 @@ def mismatch_sentence(moved, share: float) -> str:
     for name, m in moved.items():
         if m.before:
             value = quantity(Estimate(m.value, m.standard_error, m.unit))
-            parts.append(f"{name} is {value}, not {m.before:.4g}")
+            parts.append(f"{_spoken(name)} is {value}, not {m.before:.4g}")
         else:
             value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
-            parts.append(f"{name} is {value} {'more' if m.value > 0 else 'less'}")
+            parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
     return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
 
 
@@ -179,6 +179,14 @@ def changed_sentence(moved, share: float, other: str) -> str:
     text = ", ".join(parts)
     text = text[:1].upper() + text[1:]
     return f"{text} since {other or 'the other recording'}; {share:.0%} of the difference."
+
+
+def _spoken(name: str) -> str:
+    """A parameter's name, of a wave as the part of it that it is."""
+    for end, part in (("_sin", "sine"), ("_cos", "cosine")):
+        if name.endswith(end):
+            return f"the {part} part of {name.removesuffix(end)}"
+    return name
 
 
 class _Gaps(dict):

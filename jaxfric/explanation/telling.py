@@ -10,7 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
-from .baseline import Baseline, Mismatch
+from .baseline import Baseline, Mismatch, freed
 from .bins import unit
 from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
@@ -56,7 +56,9 @@ def tell(
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
-    values = spelled.estimates(_freed(found.last, wrong), asked.block, units)[0]
+    values = spelled.estimates(
+        found.last if wrong is None else freed(found.last, wrong.moved), asked.block, units
+    )[0]
     if wrong is not None:
         findings = [_moved(values, wrong, known, found, first, asked), *findings]
         shown = [moved_curve(asked, better, wrong), *shown]
@@ -161,17 +163,6 @@ def _doubted(verdict: str, remarks: Sequence[Remark], compared: bool) -> str:
     )
 
 
-def _freed(now: Fit, wrong: Mismatch | None) -> Fit:
-    """A fit of whose base only the wrong values were fitted; what stayed has no error."""
-    if wrong is None:
-        return now
-    columns, slopes = now.columns.copy(), now.slopes.copy()
-    count, searched = len(now.alphas[0]), len(now.betas[0])
-    columns[:, [i for i in range(count) if i not in wrong.moved]] = 0.0
-    slopes[:, [i for i in range(searched) if count + i not in wrong.moved]] = 0.0
-    return now._replace(columns=columns, slopes=slopes)
-
-
 def _moved(
     values, wrong: Mismatch, known: Baseline, found: Named, first: Fit, asked: Question
 ) -> Finding:
@@ -190,10 +181,11 @@ def _moved(
     text = mismatch_sentence(moved, wrong.share)
     if known.fit is not None:
         text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
-    equation = "θ = θ₀ + Δθ"
+    instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(
-        "parameter_mismatch", equation, text, (), "", moved, wrong.share, held, wrong.p_value
-    )
+        "parameter_mismatch", "θ = θ₀ + Δθ", text, (), "", moved,
+        wrong.share, held, wrong.p_value, instead=instead,
+    )  # fmt: skip
 
 
 def shown_places(places: list[Place], least: float, force: float) -> list[Place]:

@@ -73,6 +73,8 @@ def _growing(slips: Sequence[Part], values: Mapping[str, float]) -> list[float]:
     slopes: list[tuple[int, float]] = []
     for part in slips:
         for name, parameter in zip(part.affine, part.term.affine, strict=True):
+            if isinstance(parameter.dimension, str):
+                continue
             force, position, time = parameter.dimension
             if force == 1 and position == -time and time > 0:
                 slopes.append((time, values[name]))

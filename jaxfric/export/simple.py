@@ -52,6 +52,12 @@ def joint(
     given += sum(
         (counted[part.key] for part in sprung if part.key in counted), np.zeros_like(velocity)
     )
+    constant = 0.0
+    if sprung:  # that of the spring, which a model has as an offset or between both directions
+        constant = float(np.average(slip - level * np.sign(velocity) - slope * velocity,
+                                    weights=where.weight))  # fmt: skip
+        rest, given = rest - constant / stiffness, given + constant
+        sprung += [part for part in parts(model) if isinstance(part.law, laws.Offset)]
     wanted = sum(counted.values(), np.zeros_like(velocity))
     missing = _missing(model, sprung)
     bursts = sum(cost.burst(model, part) for part in missing)
@@ -65,8 +71,19 @@ def joint(
         is_rotary(dict(model.units)),
         cost.error(where, wanted, given, unit, bursts),
         tuple(_told(model, part, counted, where, unit) for part in missing),
-        _units(model),
+        (*_units(model), *_shifted(model, constant, rest)),
         known["velocity"],
+    )
+
+
+def _shifted(model: Model, constant: float, rest: float) -> tuple[str, ...]:
+    """That a spring holds a constant force, for which a joint has no other place."""
+    units = dict(model.units)
+    if abs(constant) < 1e-9:
+        return ()
+    return (
+        f"The constant force of {constant:.4g} {units['force']} is in the spring, which rests at "
+        f"{rest:.4g} {units['position']}.",
     )
 
 

@@ -1,4 +1,4 @@
-"""How two languages spell the same arithmetic."""
+"""How three languages spell the same arithmetic."""
 
 import re
 from collections.abc import Mapping
@@ -58,6 +58,12 @@ C = Syntax(
         "sign_of": "static double sign_of(double value)\n"
         "{\n    return (double)((value > 0.0) - (value < 0.0));\n}\n"
     },
+)
+PYTHON = Syntax(
+    functions={"sign": "sign_of", "exp": "math.exp", "sin": "math.sin", "cos": "math.cos"},
+    power="({0}) ** ({1})",
+    choice="({1} if {0} else {2})",
+    helpers={"sign_of": "def sign_of(value):\n    return math.tanh(value / SLOW)\n"},
 )
 MODELICA = Syntax(
     functions={}, power="({0})^({1})", choice="(if {0} then {1} else {2})", helpers={}

@@ -120,6 +120,8 @@ def fastest_speed(model: Any) -> float:
     speeds = [BUMP * values[p.name] for p in term.nonlinear if p.dimension == VELOCITY]
     constant = [values[p.name] for p in term.affine if p.dimension == FORCE and p.name in values]
     for p in term.affine:
+        if isinstance(p.dimension, str):
+            continue
         force, position, time = p.dimension
         grows = force == 1 and position == -time and time > 0
         if grows and constant and values.get(p.name, 0) > 0:

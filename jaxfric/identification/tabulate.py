@@ -260,3 +260,41 @@ def _places(document: Mapping[str, Any]) -> list[Block]:
         hidden.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
     tables = [Table(where, (1, 2)), Table(hidden, (1,))]
     return [table for table in tables if len(table.rows) > 1]
+
+
+def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
+    """What a simulator's joints and a log differ in, a row each."""
+    table = [["joint", "verdict", "error", "after", "held out", "after", "what"]]
+    for row in rows:
+        if "error" in row:
+            table.append([row["joint"], row["verdict"], *[""] * 4, "see below"])
+            continue
+        errors = [row["filtered_force_error"], row["filtered_holdout_force_error"]]
+        cells = [f"{e[w]:.2%}" if e else "" for e in errors for w in ("before", "after")]
+        table.append([row["joint"], row["verdict"], *cells, "see below" * bool(row["findings"])])
+    lines = [f"{printable(simulator)} against {printable(log)}", ""]
+    lines += aligned(table, (2, 3, 4, 5))
+    for row in rows:
+        said = [row["error"]] if "error" in row else row["findings"]
+        for each in said:
+            lines += ["", *wrapped(f"{row['joint']}: {each}")]
+        if row.get("corrected_before"):
+            lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
+    lines += ["", "Force errors through the kernel by which effects are looked for."]
+    return "\n".join(lines)
+
+
+def patch(path: str, document: Mapping[str, Any]) -> str:
+    """What was written into a simulator's file, and what that is worth."""
+    lines = [f"{path}:"]
+    lines += [f"  {line}" for line in document["written"] or ["nothing to change"]]
+    for line in document["left"]:
+        lines += wrapped(f"  not written: {line}")
+    table = [["force error", "before", "with the file", "with the callback too"]]
+    for joint, errors in document["errors"].items():
+        for name, error in errors.items():
+            held = "held out" if name.startswith("holdout") else "recording"
+            cells = [f"{error[w]:.2%}" if w in error else "" for w in ("before", "file", "forces")]
+            table.append([f"{joint}, {held}", *cells])
+    lines += ["", *aligned(table, (1, 2, 3)), "", *wrapped(document["remark"])]
+    return "\n".join(lines)

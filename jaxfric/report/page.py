@@ -21,6 +21,16 @@ _VERDICTS = {
 }
 
 
+def verdict_name(verdict: str) -> str:
+    """A verdict as the page calls it."""
+    return _VERDICTS[verdict]
+
+
+def style() -> str:
+    """The style sheet of the page."""
+    return _asset("page.css")
+
+
 def library():
     """The module `jinja2`; raises `ValueError` without it."""
     try:
@@ -56,7 +66,7 @@ def render(
     curves = pictures or {}
     context = _context(document, curves) | _reproduce(document, command, date)
     page = {
-        "style": _asset("page.css"),
+        "style": style(),
         "chart_style": _asset("uPlot.min.css"),
         "library": _asset("uPlot.iife.min.js"),
         "script": _asset("page.js"),

@@ -1,8 +1,10 @@
 """A simulator whose force along the recorded motion is given: nothing of it is fitted."""
 
+import abc
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -30,8 +32,43 @@ TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
 SAME = 1e-3
 
 
+class Attribute(NamedTuple):
+    """A parameter of a simulator in its own words.
+
+    - `owner`: what it belongs to, "joint elbow" or "body forearm"; `what`: "damping"; `value` in
+      the simulator, `unit`; `alike`: others whose force is the same at this joint but for a factor,
+      in words; `rest`: where a spring's force is zero.
+    """
+
+    owner: str
+    what: str
+    value: float
+    unit: str
+    alike: tuple[str, ...] = ()
+    rest: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{self.what} of {self.owner}"
+
+
+class AbstractSimulator(abc.ABC):
+    """Another program's simulator as a baseline: its force along a recorded motion."""
+
+    @abc.abstractmethod
+    def baseline(self, units) -> Model:
+        """The simulator's force with corrections of zero."""
+
+    @abc.abstractmethod
+    def beside(self, recording: Recording, held_out: bool = False) -> Recording:
+        """The recording with what the simulator says of its motion as channels."""
+
+    @abc.abstractmethod
+    def attributes(self) -> Mapping[str, Attribute]:
+        """The simulator's own parameters by the names of the corrections; none where unknown."""
+
+
 @dataclasses.dataclass(frozen=True)
-class Known:
+class Known(AbstractSimulator):
     """A simulator's force along the recorded motion, as a baseline of `explain`.
 
     **Arguments:**
@@ -48,6 +85,9 @@ class Known:
     force: Force | None = None
     holdout: ArrayLike | None = None
     corrections: AbstractTerm | None = None
+
+    def baseline(self, units) -> Model:
+        return self.model(units)
 
     def model(self, units) -> Model:
         """The simulator's force with corrections of zero."""
@@ -70,6 +110,9 @@ class Known:
                 f"Known({missing}...), a function, or the channel {KNOWN_FORCE!r}."
             )
         return along(recording, force(recording) if callable(force) else force, held_out)
+
+    def attributes(self) -> Mapping[str, Attribute]:
+        return {}
 
 
 def _plain(units) -> AbstractTerm:

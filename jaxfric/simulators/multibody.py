@@ -1,35 +1,53 @@
 """MuJoCo's inverse dynamics along a recorded motion (MuJoCo reads MJCF and URDF)."""
 
 import dataclasses
+import hashlib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from .. import signals
 from ..data.recording import Recording
+from ..models import Model
+from ..terms import KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, KnownForce, Offset, channels_of
+from ..terms.base import Sum
+from . import columns, inverse
+from .known import AbstractSimulator, Attribute, along
+from .loading import joints_of, library, read
 
 
-class Mujoco:
+class Mujoco(AbstractSimulator):
     """The force that a MuJoCo model needs at one joint for a recorded motion.
 
-    A function from a recording to that force, `(N,)`, for `explain` as a baseline. Velocity and
-    acceleration are smoothing derivatives of the recorded positions, of the width that is best for
-    the second one: what is faster than that, the simulator's force does not show.
+    A baseline of `explain`, and a function from a recording to that force, `(N,)`. For `explain`
+    the momentum stands apart, so that its derivative goes through the same kernel as the recorded
+    force; only MuJoCo's soft dry friction sees a smoothed acceleration. What the model's own
+    parameters change is a column each: damping, frictionloss, armature and stiffness of the joint,
+    gear of its actuator; mass, centre of mass and inertia of each body that it moves.
 
     **Arguments:** `model`: a file (MJCF or URDF) or its text; `joint`: name of the joint that the
     recording is of, where there are several. The positions of the others are channels of the
-    recording by their joints' names, in the model's own units, rad or m.
+    recording by their joints' names, in the model's own units, rad or m; `folder`, in which the
+    meshes of a model that is given as text lie; `shared`, a memory for several joints of one log.
 
     **Raises:** `ValueError` for a model that MuJoCo cannot read, for free and ball joints, closed
     loops, and a joint or channel that is not there.
     """
 
-    def __init__(self, model: str | Path, joint: str | None = None):
-        self.mujoco = _library()
-        self.model = _read(self.mujoco, model)
-        self.joints = _joints(self.mujoco, self.model)
+    def __init__(
+        self,
+        model: str | Path,
+        joint: str | None = None,
+        folder: Path | None = None,
+        shared: dict[bytes, inverse.Along] | None = None,
+    ):
+        self.mujoco, self._source = library(), str(model)
+        self._shared = {} if shared is None else shared
+        self.model = read(self.mujoco, model, folder)
+        self.joints = joints_of(self.mujoco, self.model)
         if joint is None and len(self.joints) > 1:
             raise ValueError(
                 f"The model has {len(self.joints)} joints: {', '.join(self.joints)}. Say which one "
@@ -40,22 +58,50 @@ class Mujoco:
             raise ValueError(
                 f"The model has no joint {joint!r}. Its joints are {', '.join(self.joints)}."
             )
-        self.joint = joint
+        self.joint, self.number = joint, self.joints.index(joint)
+        self.columns = columns.distinct(self.mujoco, self.model, self.number, joint)
 
     def __call__(self, recording: Recording) -> Float[np.ndarray, " N"]:
         """The generalised force at the joint, N or N·m, `(N,)`."""
-        motion = np.array([self._along(recording, name) for name in self.joints])
-        position, velocity, acceleration = np.moveaxis(motion, 0, -1)
-        at, data = self.joints.index(self.joint), self.mujoco.MjData(self.model)
-        force = np.empty(len(position))
-        for i in range(len(position)):
-            data.qpos[:], data.qvel[:], data.qacc[:] = position[i], velocity[i], acceleration[i]
-            self.mujoco.mj_inverse(self.model, data)
-            force[i] = data.qfrc_inverse[at]
-        return force
+        return self.along(recording).force[:, self.number]
 
-    def _along(self, recording: Recording, joint: str):
-        """Position, velocity and acceleration of a joint, each `(N,)`."""
+    def baseline(self, units) -> Model:
+        """The model's force, with corrections of zero to its parameters and a constant force."""
+        own = self.attributes()
+        names, spelled = tuple(own), tuple(each.unit for each in own.values())
+        term = Sum((KnownForce(), KnownColumns(names, spelled), Offset()))
+        return Model(term, jnp.zeros(len(term.affine)), units)
+
+    def attributes(self) -> Mapping[str, Attribute]:
+        """The model's parameters that the joint's force tells of, by the corrections' names."""
+        return self.columns.attributes
+
+    def beside(self, recording: Recording, held_out: bool = False) -> Recording:
+        """The recording with the model's force and what each parameter adds, as channels."""
+        seen, own = self.along(recording), self.number
+        found = {KNOWN_REST: seen.rest[:, own], KNOWN_MOMENTUM: seen.momentum[:, own]}
+        for number, parts in enumerate(self.columns.along(seen)):
+            found |= dict(zip(channels_of(number), parts, strict=True))
+        known = along(recording, seen.force[:, own], held_out)
+        sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
+        return dataclasses.replace(known, channels=known.channels | sound)
+
+    def along(self, recording: Recording) -> inverse.Along:
+        """What the model says of all joints along a recorded motion."""
+        logs = [self._position(recording, name) for name in self.joints]
+        places = [np.asarray(log.position).tobytes() for log in logs]
+        source = self._source.encode()
+        key = hashlib.sha256(
+            b"".join([source, *places, np.asarray(logs[0].time).tobytes()])
+        ).digest()
+        if key not in self._shared:
+            parts = np.array([derived(log) for log in logs])
+            motion = inverse.Motion(*np.moveaxis(parts, 0, -1))
+            self._shared[key] = inverse.along(self.mujoco, self.model, motion)
+        return self._shared[key]
+
+    def _position(self, recording: Recording, joint: str) -> Recording:
+        """The recording with the position of a joint as its own, and nothing derived from it."""
         if joint != self.joint:
             if joint not in recording.channels:
                 raise ValueError(
@@ -71,58 +117,23 @@ class Mujoco:
                 f"{recording.source or 'The recording'} has no position, which a simulator needs. "
                 "Name its column: --columns position=NAME."
             )
-        choice = signals.choose(recording, order=2)
-        position = np.asarray(recording.position, float)
-        velocity = signals.derivative(recording, position, choice.half_width, choice.degree)
-        acceleration = signals.derivative(recording, velocity, choice.half_width, choice.degree)
-        return position, velocity, acceleration
+        return dataclasses.replace(recording, velocity=None, channels={})
+
+
+def derived(recording: Recording):
+    """Position, velocity and acceleration by smoothing derivatives of the position, `(N,)` each.
+
+    The velocity is that of [`prepare`][jaxfric.signals.prepare]; the acceleration is of the width
+    that is best for a second derivative.
+    """
+    position = np.asarray(recording.position, float)
+    first, second = (signals.choose(recording, order=order) for order in (1, 2))
+    velocity = signals.derivative(recording, position, first.half_width, first.degree)
+    rough = signals.derivative(recording, position, second.half_width, second.degree)
+    acceleration = signals.derivative(recording, rough, second.half_width, second.degree)
+    return position, velocity, acceleration
 
 
 def mujoco(model: str | Path, joint: str | None = None) -> Mujoco:
     """A MuJoCo model (MJCF or URDF) as a baseline of `explain`; see [`Mujoco`][]."""
     return Mujoco(model, joint)
-
-
-def _library() -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise ValueError(
-            "MuJoCo is not installed, which a MuJoCo or URDF model needs. Install it: "
-            'pip install "jaxfric[mujoco]".'
-        ) from error
-    return mujoco
-
-
-def _read(mujoco: Any, model: str | Path) -> Any:
-    text = str(model)
-    try:
-        if text.lstrip().startswith("<"):
-            return mujoco.MjModel.from_xml_string(text)
-        if not Path(text).is_file():
-            raise ValueError(f"{text}: there is no such file.")
-        return mujoco.MjModel.from_xml_path(text)
-    except ValueError as error:
-        name = "The model" if text.lstrip().startswith("<") else text
-        message = str(error)
-        raise ValueError(
-            message if "no such file" in message else f"{name}: MuJoCo cannot read it: {message}"
-        ) from error
-
-
-def _joints(mujoco: Any, model: Any) -> list[str]:
-    """The joints' names in the order of the generalised coordinates."""
-    names = [model.joint(i).name or f"joint{i + 1}" for i in range(model.njnt)]
-    single = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
-    if wrong := [n for n, k in zip(names, model.jnt_type, strict=True) if int(k) not in single]:
-        raise ValueError(
-            f"The model's joint {wrong[0]} is free or a ball, whose position a log of an axis does "
-            "not hold. Fix it in the model."
-        )
-    if model.neq:
-        raise ValueError(
-            "The model closes loops by equality constraints, whose forces no log tells. Open them."
-        )
-    if not names:
-        raise ValueError("The model has no joint.")
-    return names

@@ -31,9 +31,14 @@ from .friction import (
 )
 from .inertia import Inertia as Inertia, Offset as Offset
 from .known import (
+    KNOWN as KNOWN,
     KNOWN_FORCE as KNOWN_FORCE,
+    KNOWN_MOMENTUM as KNOWN_MOMENTUM,
+    KNOWN_REST as KNOWN_REST,
+    KnownColumns as KnownColumns,
     KnownForce as KnownForce,
     KnownGain as KnownGain,
+    channels_of as channels_of,
 )
 from .position import (
     Cogging as Cogging,

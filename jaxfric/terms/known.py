@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -13,6 +14,11 @@ from .table import reading
 
 # The channel that holds it, N or N·m.
 KNOWN_FORCE = "known_force"
+# The same in two parts, where the simulator says them: rest + d/dt momentum. Then no acceleration
+# has to be derived from the recorded motion.
+KNOWN_REST, KNOWN_MOMENTUM = "known_rest", "known_momentum"
+# Channels that begin so belong to a simulator.
+KNOWN = "known_"
 
 
 class KnownForce(AbstractTerm):
@@ -63,3 +69,34 @@ class KnownGain(AbstractLaw):
 
     def law(self, sample: Sample):
         return (reading(sample, KNOWN_FORCE),)
+
+
+class KnownColumns(AbstractLaw):
+    """What a simulator's own parameters add where they are others: u = Σ Δθ_i ∂f_known/∂θ_i.
+
+    **Arguments:** `names` of the parameters, and their units as they are `spelled`. Recordings
+    bring the derivatives as the channels of [`channels_of`][], in two parts as the force.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True, converter=tuple)
+    spelled: tuple[str, ...] = eqx.field(static=True, converter=tuple)
+
+    @property
+    def affine(self):
+        pairs = zip(self.names, self.spelled, strict=True)
+        return tuple(Parameter(name, unit) for name, unit in pairs)
+
+    @property
+    def coordinates(self):
+        return frozenset(name for i in range(len(self.names)) for name in channels_of(i))
+
+    def law(self, sample: Sample):
+        return tuple(reading(sample, channels_of(i)[0]) for i in range(len(self.names)))
+
+    def impulse(self, sample: Sample):
+        return tuple(reading(sample, channels_of(i)[1]) for i in range(len(self.names)))
+
+
+def channels_of(number: int) -> tuple[str, str]:
+    """The channels of a simulator's parameter: the rest, and what is differentiated in time."""
+    return f"{KNOWN}column_{number}", f"{KNOWN}column_{number}_momentum"

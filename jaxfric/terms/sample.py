@@ -78,6 +78,9 @@ class Resolution(NamedTuple):
 class Parameter(NamedTuple):
     """A parameter's name, dimension and, where it is searched for, its compact set and its grid.
 
+    A dimension that is no product of force, position and time, a mass beside an angle, is the name
+    of its unit.
+
     `bounds` maps the [`Scales`][] of a recording to `(lower, upper)`, the set B of Kim, Kim & Ha
     (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio. `resolution`
     says how near to each other two minima of the cost can be; `None` for a cost that is smooth over
@@ -85,7 +88,7 @@ class Parameter(NamedTuple):
     """
 
     name: str
-    dimension: Dimension = DIMENSIONLESS
+    dimension: Dimension | str = DIMENSIONLESS
     bounds: Callable[[Scales], tuple[Array, Array]] | None = None
     logarithmic: bool = True
     resolution: Resolution | None = None

@@ -1,0 +1,261 @@
+"""`jaxfric explain --mujoco`: a simulator's joints against a log, and its file put right."""
+
+import os
+from argparse import Namespace
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..data.io import read_with_notes
+from ..data.joints import columns_of
+from ..data.provenance import sha256
+from ..data.recording import Recording
+from ..data.tables import load
+from ..explanation import Explanation, explain
+from ..export.patch import Patch, patch
+from ..identification import documents, tabulate
+from ..programs import kept_in
+from ..report import page, robot
+from ..simulators import Mujoco
+from ..simulators.inverse import Along
+from ..simulators.loading import is_hinge, joints_of, library, read as read_model
+from ..simulators.patching import folder_of, patched
+from .commands import programs_folder, put, read, today, working
+from .options import message, say, standard
+
+SCHEMA = "jaxfric.robot/1"
+# What the log of one joint gives no role to.
+OTHERS = ("velocity", "reference", "load", "temperature", "segment")
+
+
+class Joint(NamedTuple):
+    """One joint's answer: the explanation, or why there is none; its recordings and simulator."""
+
+    name: str
+    told: Explanation | None
+    error: str
+    logs: list[Recording]
+    simulator: Mujoco | None
+    notes: list[str]
+    corrected: tuple[str, ...] = ()
+
+
+def run(arguments: Namespace) -> int:
+    """Explain the joints that the log has; print them, and write what was asked for."""
+    if arguments.report:
+        page.library()
+    mujoco = library()
+    model = read_model(mujoco, arguments.mujoco)
+    joints = joints_of(mujoco, model)
+    if arguments.joint and arguments.joint not in joints:
+        raise ValueError(
+            f"{arguments.mujoco}: there is no joint {arguments.joint!r}. Its joints are "
+            f"{', '.join(joints)}."
+        )
+    found = _explained(arguments, mujoco, model, joints)
+    done = [joint for joint in found if joint.told is not None]
+    if not done:
+        raise ValueError(found[0].error)
+    patch_ = _patched(arguments, done)
+    texts = _written(arguments, found, patch_)
+    for path, text in texts.items():
+        put(path, text)
+    if not any(standard(path) for path in texts):
+        _print(arguments, found, patch_)
+    return 0
+
+
+def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str]) -> list[Joint]:
+    """The joints of the log, those farther out first: what is wrong of a body is put right before
+    the joints that carry it are judged.
+    """
+    logs = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
+    columns = [_columns(path, joints, arguments) for path in logs]
+    whole = [joint for joint in joints if all("force" in each.get(joint, {}) for each in columns)]
+    chosen = [arguments.joint] if arguments.joint else whole
+    if not whole and (len(joints) == 1 or arguments.joint):
+        chosen = [arguments.joint or joints[0]]
+        columns = [{} for _ in columns]
+    elif not set(chosen) & set(whole):
+        raise ValueError(
+            f"{arguments.file}: no joint of the model has a position and a force in this log. The "
+            f"joints are {', '.join(joints)}. Name the columns: --columns "
+            f"{joints[0]}_position=NAME,{joints[0]}_force=NAME."
+        )
+    source: str | Path = arguments.mujoco
+    found: list[Joint] = []
+    corrected: tuple[str, ...] = ()
+    shared: dict[bytes, Along] = {}
+    with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
+        for name in reversed(chosen):
+            doing(f"joint {name}")
+            hinge = is_hinge(mujoco, model, joints.index(name))
+            one = _joint(name, source, shared, logs, columns, arguments, hinge)
+            found.insert(0, one._replace(corrected=corrected))
+            if bodies := _bodies(one):
+                changed = patched(mujoco, source, bodies, folder_of(arguments.mujoco))
+                source = changed.text
+                said = [f"{key} at {bodies[key]:.5g}" for key in changed.written]
+                corrected = (*corrected, *said)
+    return found
+
+
+def _columns(path: str, joints: list[str], arguments: Namespace) -> dict[str, dict[str, str]]:
+    return columns_of(load(Path(path)).columns, joints, arguments.columns, path)
+
+
+def _joint(name: str, source, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
+    logs, notes = [], list[str]()
+    try:
+        simulator = Mujoco(source, name, folder_of(arguments.mujoco), shared)
+        for path, own in zip(paths, columns, strict=True):
+            log, more = _log(path, name, own, arguments, hinge)
+            logs.append(log)
+            notes += more
+        told = explain(
+            logs[0], simulator, logs[1] if len(logs) > 1 else None, simulate=arguments.simulate
+        )
+    except ValueError as error:
+        text = message(error)
+        prefix = "" if text.startswith(tuple(paths)) else f"{paths[0]}: "
+        return Joint(name, None, f"{prefix}{text}", logs, None, notes)
+    return Joint(name, told, "", logs, simulator, notes)
+
+
+def _log(
+    path: str, name: str, own: Mapping[str, Mapping[str, str]], arguments: Namespace, hinge: bool
+) -> tuple[Recording, list[str]]:
+    """The recording of one joint, with the positions of the others as channels."""
+    units = {"force": "N·m", "position": "rad"} if hinge else {"force": "N", "position": "m"}
+    units |= arguments.units
+    if not own:
+        given = Namespace(**vars(arguments) | {"units": units})
+        log, notes = read(path, given)
+    else:
+        others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
+        roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
+        if "time" in arguments.columns:
+            roles["time"] = arguments.columns["time"]
+        turned = arguments.scale.get("position")
+        scale = arguments.scale | ({} if turned is None else dict.fromkeys(others, turned))
+        log, notes = read_with_notes(
+            path, columns=roles, scale=scale, units=units, period=arguments.period,
+            repair=arguments.repair, rate=arguments.rate,
+        )  # fmt: skip
+    return log, notes
+
+
+def _bodies(joint: Joint) -> dict[str, float]:
+    """The wrong values of bodies that nothing else could stand for."""
+    found: dict[str, float] = {}
+    for finding in joint.told.findings if joint.told else []:
+        if finding.effect == "parameter_mismatch" and not finding.instead:
+            found |= {
+                key: float(m.value) for key, m in finding.parameters.items() if key[:5] == "body/"
+            }
+    return found
+
+
+def _patched(arguments: Namespace, done: list[Joint]) -> Patch | None:
+    """The simulator's file with what was found, if one was asked for."""
+    if not arguments.save or not arguments.save.lower().endswith(".xml"):
+        return None
+    return patch(
+        arguments.mujoco,
+        {joint.name: joint.told for joint in done if joint.told is not None},
+        {joint.name: joint.logs for joint in done},
+        arguments.save,
+    )
+
+
+def _document(arguments: Namespace, joint: Joint) -> dict[str, Any]:
+    if joint.told is None:
+        return {"verdict": "refused", "error": joint.error}
+    document = joint.told.to_dict()
+    document["recording"]["notes"] = joint.notes
+    document["baseline"] |= {"file": arguments.mujoco, "sha256": sha256(arguments.mujoco)}
+    return document
+
+
+def _row(joint: Joint) -> dict[str, Any]:
+    """One joint of the summary."""
+    if joint.told is None:
+        return {"joint": joint.name, "verdict": "refused", "error": joint.error}
+    errors = joint.told.fit
+    return {
+        "joint": joint.name,
+        "verdict": joint.told.verdict,
+        "findings": [_said(finding) for finding in joint.told.findings],
+        "filtered_force_error": errors["filtered_force_error"],
+        "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
+        "corrected_before": list(joint.corrected),
+    }
+
+
+def _said(finding) -> str:
+    if finding.effect == "parameter_mismatch":
+        return finding.sentence.removeprefix("Wrong in the simulator: ").rpartition("; ")[0]
+    return finding.effect.replace("_", " ")
+
+
+def _written(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict[str, str]:
+    """What was asked for, by path."""
+    texts = {}
+    if arguments.json:
+        texts[arguments.json] = documents.to_json(_whole(arguments, found, done))
+    if arguments.report:
+        texts |= _pages(arguments, found, done)
+    if done is not None:
+        texts[arguments.save] = done.text
+        if done.forces is not None:
+            texts[str(Path(arguments.save).with_name(done.module))] = done.forces
+    elif arguments.save:
+        told = found[0].told
+        if len(found) > 1 or told is None:
+            raise ValueError(
+                f"--save {arguments.save}: several joints are no one model. Save the simulator's "
+                "file (--save robot.xml), or one joint (--joint NAME)."
+            )
+        texts[arguments.save] = documents.to_json(documents.saved(told.model, *found[0].logs))
+    return texts
+
+
+def _whole(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict[str, Any]:
+    """The document: that of the joint where one is named, else of the robot, a row each."""
+    after = {} if done is None else {"patch": done.to_dict()}
+    if len(found) == 1 and found[0].told is not None:
+        return _document(arguments, found[0]) | after
+    rows = [_row(joint) | {"explanation": _document(arguments, joint)} for joint in found]
+    return {"schema": SCHEMA, "simulator": os.fspath(arguments.mujoco), "joints": rows, **after}
+
+
+def _pages(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict[str, str]:
+    """The page of a joint; of several one of the robot, and theirs behind it."""
+    documents_ = [_document(arguments, joint) for joint in found]
+    if len(found) == 1:
+        return {arguments.report: _page(arguments, documents_[0], found[0])}
+    path = Path(arguments.report)
+    if standard(arguments.report):
+        raise ValueError("--report -: several joints have a page each; name a file.")
+    texts, links = {}, {}
+    for joint, document in zip(found, documents_, strict=True):
+        if joint.told is not None:
+            links[joint.name] = f"{path.stem}_{joint.name}.html"
+            texts[str(path.with_name(links[joint.name]))] = _page(arguments, document, joint)
+    rows = [_row(joint) for joint in found]
+    lines = [] if done is None else [*done.written, *(f"not written: {x}" for x in done.left)]
+    whole = robot.render(arguments.mujoco, arguments.file, rows, links, lines)
+    return {arguments.report: whole} | texts
+
+
+def _page(arguments: Namespace, document: Mapping[str, Any], joint: Joint) -> str:
+    return page.render(document, joint.told.curves if joint.told else {}, arguments.typed, today())
+
+
+def _print(arguments: Namespace, found: list[Joint], done: Patch | None) -> None:
+    if len(found) == 1 and found[0].told is not None:
+        say(tabulate.explanation(_document(arguments, found[0])))
+    else:
+        say(tabulate.joints(arguments.mujoco, arguments.file, [_row(joint) for joint in found]))
+    if done is not None:
+        say(f"\n{tabulate.patch(arguments.save, done.to_dict())}")

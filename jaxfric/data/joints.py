@@ -1,0 +1,125 @@
+"""Which columns of a robot's log are whose: `elbow_position`, `elbow/pos`, `q1`, `tau1`.
+
+A column's name is a joint's name and the name of a role, in either order, with words such as
+`joint_states` beside them; or a role and a number, where there are as many numbers as joints.
+"""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from .columns import describe
+from .printable import listed
+
+ROLES = ("position", "force")
+# What stands in topics and headers beside joint and role.
+_BESIDE = frozenset("joint joints state states jointstate jointstates data robot arm".split())
+
+
+def _words(name: str) -> list[str]:
+    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name)
+    return re.findall(r"\d+|[^\W\d_]+", name.lower())
+
+
+def columns_of(
+    columns: Iterable[str], joints: Sequence[str], given: Mapping[str, str], source: str
+) -> dict[str, dict[str, str]]:
+    """The columns of position and force of each joint that the log has both of.
+
+    **Arguments:** `given`, what the user says: `elbow` (its position; its force is then the column
+    that differs from it in the role alone), `elbow_position`, `elbow_force`, each with a column.
+
+    **Raises:** `ValueError` if two columns stand for one role of one joint, or a column that is
+    given is not there.
+    """
+    names = list(columns)
+    found: dict[str, dict[str, list[str]]] = {joint: {} for joint in joints}
+    numbered = _numbered(names)
+    for name in names:
+        for joint, role in _named(name, joints):
+            found[joint].setdefault(role, []).append(name)
+    named = any(role in ROLES for roles in found.values() for role in roles)
+    if not named and (by_order := _by_order(numbered, joints)):
+        found = by_order
+    for joint in joints:
+        for role, name in _given(joint, given, names, numbered, source).items():
+            found[joint][role] = [name]
+    for joint, roles in found.items():
+        for role, several in roles.items():
+            if role in ROLES and len(several) > 1:
+                raise ValueError(
+                    f"{source}: {len(several)} columns could be the {role} of the joint {joint}: "
+                    f"{listed(several)}. Say which: --columns {joint}_{role}={several[0]}."
+                )
+    picked = {
+        joint: {role: roles[role][0] for role in ROLES if role in roles}
+        for joint, roles in found.items()
+    }
+    return {joint: roles for joint, roles in picked.items() if "position" in roles}
+
+
+def _named(name: str, joints: Sequence[str]) -> list[tuple[str, str]]:
+    """The joint whose name is part of a column's, and the role of the rest; the longest name."""
+    words, best = _words(name), list[tuple[int, str, str]]()
+    for joint in joints:
+        own = _words(joint)
+        for at in range(len(words) - len(own) + 1):
+            if words[at : at + len(own)] != own:
+                continue
+            rest = words[:at] + words[at + len(own) :]
+            role = _role(rest)
+            if role:
+                best.append((len(own), joint, role))
+    longest = max((size for size, _, _ in best), default=0)
+    return list(dict.fromkeys((joint, role) for size, joint, role in best if size == longest))
+
+
+def _role(words: Sequence[str]) -> str | None:
+    plain = "_".join(words)
+    return describe(plain)[0] or describe("_".join(w for w in words if w not in _BESIDE))[0]
+
+
+def _numbered(names: Sequence[str]) -> dict[str, dict[int, str]]:
+    """Columns that are a role and a number, by role and number; the first family of each role."""
+    found: dict[str, dict[str, dict[int, str]]] = {}
+    for name in names:
+        words = _words(name)
+        digits = [i for i, word in enumerate(words) if word.isdigit()]
+        if len(digits) != 1:
+            continue
+        rest = words[: digits[0]] + words[digits[0] + 1 :]
+        if role := _role(rest):
+            family = found.setdefault(role, {}).setdefault("_".join(rest), {})
+            family[int(words[digits[0]])] = name
+    return {role: next(iter(families.values())) for role, families in found.items()}
+
+
+def _by_order(numbered: Mapping[str, Mapping[int, str]], joints: Sequence[str]):
+    """Numbered columns in the order of the joints, where there are as many as joints."""
+    found: dict[str, dict[str, list[str]]] = {joint: {} for joint in joints}
+    for role, family in numbered.items():
+        if len(family) == len(joints) and sorted(family)[0] in (0, 1):
+            for joint, number in zip(joints, sorted(family), strict=True):
+                found[joint][role] = [family[number]]
+    return found if any(found.values()) else None
+
+
+def _given(joint, given, names, numbered, source: str) -> dict[str, str]:
+    """What the user says of a joint."""
+    found = {}
+    for key, role in ((joint, "position"), (f"{joint}_position", "position"),
+                      (f"{joint}_force", "force")):  # fmt: skip
+        if key not in given:
+            continue
+        if given[key] not in names:
+            raise ValueError(
+                f"{source}: there is no column {given[key]!r} for {key}. The columns are: "
+                f"{listed(names)}."
+            )
+        found[role] = given[key]
+    if "position" in found and "force" not in found:
+        places = [
+            n for n, name in numbered.get("position", {}).items() if name == found["position"]
+        ]
+        if places and places[0] in numbered.get("force", {}):
+            found["force"] = numbered["force"][places[0]]
+    return found

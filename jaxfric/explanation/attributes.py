@@ -1,0 +1,125 @@
+"""Wrong values of another simulator in its own words: what belongs to it, from what to what."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..identification.uncertainty import Estimate
+from ..simulators import Attribute
+from .explained import Explanation, Finding, Moved
+from .sentences import quantity
+
+MISMATCH = "parameter_mismatch"
+# Corrections that are no attribute by themselves.
+GAIN, CONSTANT = "gain", "offset"
+# More than these no one reads.
+MOST = 4
+STIFFNESS, REFERENCE = "stiffness", "springref"
+
+
+def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation:
+    """An explanation whose wrong values are the simulator's attributes, from their own values.
+
+    The model keeps the corrections, which are zero where the simulator is right.
+    """
+    findings = [_reworded(f, own) if f.effect == MISMATCH else f for f in told.findings]
+    values = {
+        name: _absolute(estimate, own[name]) if name in own and name != GAIN else estimate
+        for name, estimate in told.baseline_parameters.items()
+    }
+    return dataclasses.replace(told, findings=findings, baseline_parameters=values)
+
+
+def _absolute(estimate: Estimate, attribute: Attribute) -> Estimate:
+    return estimate._replace(value=np.float64(attribute.value + estimate.value))
+
+
+def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
+    moved = _attributes(finding.parameters, own)
+    texts = [_text(name, m, own) for name, m in moved.items()]
+    texts = [
+        text + _doubt(name, finding.instead, own) for text, name in zip(texts, moved, strict=True)
+    ]
+    share = f"{finding.share:.0%} of the unexplained force"
+    names = [name for name in moved if name in own or name.endswith(REFERENCE)]
+    return finding._replace(
+        parameters=moved,
+        sentence=f"Wrong in the simulator: {'; '.join(texts)}; {share}.",
+        attribute=", ".join(names) or None,
+    )
+
+
+def _attributes(moved: Mapping[str, Moved], own: Mapping[str, Attribute]) -> dict[str, Moved]:
+    """The wrong values as attributes: a gain as a gear, a constant force as a spring's rest."""
+    found = {}
+    for name, m in moved.items():
+        if name == GAIN:
+            before, times = own[GAIN].value, 1 + float(m.value)
+            # A gear of less force for each command, where more of it is recorded.
+            geared = own[GAIN].what == "gear"
+            value = before / times if geared else before * times
+            found[_gear(own)] = Moved(
+                before, np.float64(value), float(m.standard_error) * abs(value / times), "1"
+            )
+        elif name in own:
+            before = own[name].value
+            found[name] = Moved(before, np.float64(before + m.value), m.standard_error, m.unit)
+        else:
+            found[name] = m
+    return _sprung(found, own)
+
+
+def _gear(own: Mapping[str, Attribute]) -> str:
+    attribute = own[GAIN]
+    return attribute.owner.replace(" ", "/", 1) + "/gear" if attribute.what == "gear" else GAIN
+
+
+def _sprung(found: dict[str, Moved], own: Mapping[str, Attribute]) -> dict[str, Moved]:
+    """A constant force beside a spring is where that spring rests."""
+    name = next((n for n in own if n.endswith(f"/{STIFFNESS}")), None)
+    if name is None or CONSTANT not in found:
+        return found
+    stiffness = float(found[name].value) if name in found else own[name].value
+    before, constant = own[name].rest, found[CONSTANT]
+    if not stiffness > 0:
+        return found
+    reference = Moved(
+        before,
+        np.float64(before - float(constant.value) / stiffness),
+        float(constant.standard_error) / stiffness,
+        "rad" if "rad" in own[name].unit else "m",
+    )
+    others = {key: m for key, m in found.items() if key != CONSTANT}
+    return others | {name.replace(STIFFNESS, REFERENCE): reference}
+
+
+def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
+    """One wrong value: "joint elbow: damping 0.5 → 1.10 N·m·s/rad ± 0.02 N·m·s/rad"."""
+    said = quantity(Estimate(m.value, m.standard_error, "" if m.unit == "1" else m.unit))
+    if name == CONSTANT:
+        return f"a constant force of {said}, for which it has no attribute"
+    if name == GAIN:
+        return f"the recorded force is {said} times the simulator's"
+    if name.endswith("/gear"):
+        return f"{own[GAIN].owner}: gear {m.before:.4g} → {said}"
+    if name in own:
+        attribute = own[name]
+        text = f"{attribute.owner}: {attribute.what} {attribute.value:.4g} → {said}"
+        missing = attribute.what == STIFFNESS and not attribute.value
+        return f"missing, a spring: {text}" if missing else text
+    kind, owner, what = name.split("/")
+    return f"{kind} {owner}: {what} {m.before:.4g} → {said}"
+
+
+def _doubt(name: str, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]) -> str:
+    """What else it may be: what no motion tells from it, and what this one does not."""
+    key = GAIN if name == _gear(own) else name
+    texts = []
+    if key in own and own[key].alike:
+        texts.append(f"or {' or '.join(own[key].alike)}: no motion of this joint tells them apart")
+    if others := instead.get(key):
+        said = " or ".join(str(own[n]) if n in own else "a constant force" for n in others[:MOST])
+        said += " or others" * (len(others) > MOST)
+        texts.append(f"or {said}: this motion cannot tell them apart")
+    return f" ({'; '.join(texts)})" if texts else ""

@@ -1,0 +1,156 @@
+"""What an explanation says of a simulator, written into the simulator's own file."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..data.recording import Recording
+from ..explanation import Explanation
+from ..explanation.attributes import CONSTANT, GAIN, MISMATCH
+from ..explanation.errors import through_kernel
+from ..models import Model
+from ..simulators import Mujoco
+from ..simulators.inverse import Along
+from ..simulators.loading import library
+from ..simulators.patching import folder_of, patched
+from ..terms import KnownColumns, KnownForce
+from ..terms.base import Sum, summands
+from . import callback
+
+UNKNOWN_LOOP = (
+    "Compared along the recorded motion: the log does not hold the controller, without which the "
+    "loop cannot be run again."
+)
+
+
+class Patch(NamedTuple):
+    """A simulator's file with what was found, and what it is worth.
+
+    - `text`: the model; `forces`: Python beside it, `None` where nothing needs it; `module`: its
+      file's name.
+    - `written` and `left`: what was changed, and what was not and why, a line each.
+    - `errors`: force errors through the kernel of the explanation, by recording ("force_error",
+      "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it.
+    """
+
+    text: str
+    forces: str | None
+    written: list[str]
+    left: list[str]
+    errors: dict[str, dict[str, dict[str, float]]]
+    module: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was done as plain data, without the texts."""
+        return {
+            "written": self.written, "left": self.left, "errors": self.errors,
+            "remark": UNKNOWN_LOOP,
+        }  # fmt: skip
+
+
+def patch(
+    source: str | Path,
+    found: dict[str, Explanation],
+    recordings: dict[str, list[Recording]],
+    name: str,
+) -> Patch:
+    """The simulator's file with the findings of its joints.
+
+    **Arguments:** `source`, the file; by joint, the outermost last: the explanations, each of which
+    takes the bodies as those farther out have corrected them, and the recordings (the first is the
+    one explained, the second held out); `name` of the file to be, for the module beside it.
+    """
+    values: dict[str, tuple[float, float]] = {}
+    left: list[str] = []
+    for joint, told in reversed(found.items()):
+        for key, moved in _moved(told).items():
+            if key == GAIN:
+                left.append(_unwritten(joint, moved))
+            elif key != CONSTANT:
+                before, _ = values.get(key, (float(moved.before), 0.0))
+                values[key] = before, float(moved.value)
+    done = patched(library(), source, {key: to for key, (_, to) in values.items()})
+    written = [f"{key}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written]
+    left += [f"{key} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
+    beside = {joint: _beside(told) for joint, told in found.items()}
+    models: dict[str, Model] = {}
+    for joint, model in beside.items():
+        able, others = ([], []) if model is None else callback.told(model)
+        left += [
+            f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
+        ]
+        if able:
+            models[joint] = callback.only(model, able)
+    speeds = {joint: _speed(recordings[joint][0]) for joint in models}
+    module = f"{Path(name).stem}_forces.py"
+    forces = callback.callback(models, speeds, module) if models else None
+    written += [
+        f"{module}: joint {joint}: {', '.join(p.name for p in callback.parts(model))}"
+        for joint, model in models.items()
+    ]
+    errors = {}
+    shared: dict[bytes, Along] = {}
+    for joint, told in found.items():
+        pair = (
+            Mujoco(source, joint, shared=shared),
+            Mujoco(done.text, joint, folder_of(source), shared),
+        )
+        errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
+    return Patch(done.text, forces, written, left, errors, module)
+
+
+def _moved(told: Explanation):
+    found = next((f for f in told.findings if f.effect == MISMATCH), None)
+    return {} if found is None else found.parameters
+
+
+def _unwritten(joint: str, moved) -> str:
+    value = float(moved.value)
+    return (
+        f"joint {joint}: the recorded force is {value:.4g} times the simulator's; it has no "
+        f"actuator whose gear could say so. Scale the log: --scale force={1 / value:.5g}"
+    )
+
+
+def _beside(told: Explanation) -> Model | None:
+    """What was found beside attributes: the terms, and a constant force that no spring makes."""
+    kept, alphas, start, model = [], [], 0, told.model
+    for term in summands(model.term):
+        alpha = np.asarray(model.alpha[start : start + len(term.affine)])
+        start += len(term.affine)
+        known = isinstance(term, KnownForce | KnownColumns)
+        sprung = [p.name for p in term.affine] == [CONSTANT] and CONSTANT not in _moved(told)
+        if not known and not sprung and np.any(alpha):
+            kept.append(term)
+            alphas.append(alpha)
+    if not kept:
+        return None
+    return Model(Sum(tuple(kept)), jnp.asarray(np.concatenate(alphas)), model.units)
+
+
+def _speed(recording: Recording) -> float:
+    moved = np.abs(np.diff(np.asarray(recording.position, float)))
+    return float(np.quantile(moved / np.diff(np.asarray(recording.time, float)), 0.98))
+
+
+def _errors(told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None):
+    """The force errors through the kernel: before, of the file, and with the forces beside it."""
+    gear = 1.0
+    if GAIN in after.attributes() and after.attributes()[GAIN].what == "gear":
+        gear = before.attributes()[GAIN].value / after.attributes()[GAIN].value
+    delay = told.fit["filtered_force_error"]["force_taken_later"]
+    found = {}
+    for name, log in zip(("force_error", "holdout_force_error"), recordings, strict=False):
+        scaled = dataclasses.replace(log, force=log.force / gear)
+        error = {
+            "before": through_kernel(before.baseline(log.units), before.beside(log), delay),
+            "file": through_kernel(after.baseline(log.units), after.beside(scaled), delay),
+        }
+        if forces is not None:
+            model = Model(Sum((KnownForce(), *summands(forces.term))), forces.alpha, log.units)
+            error["forces"] = through_kernel(model, after.beside(scaled), delay)
+        found[name] = error
+    return found

@@ -1,0 +1,148 @@
+"""What each parameter of a MuJoCo model adds to the force of a joint, by a unit of it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from . import rigid
+from .inverse import Along, Motion, along, weighed, with_friction
+from .known import Attribute
+from .loading import is_hinge
+
+# Rest and momentum of a parameter's force, `(N,)` each.
+Parts = tuple[np.ndarray, np.ndarray]
+# How much of the simulator's force is recorded beyond all of it: of a torque constant, of a gear.
+GAIN = "gain"
+# Columns whose directions differ by less are one and the same, but for rounding.
+SAME = 1e-9
+# A motion on which columns are compared: a few hundred states that no two columns share by chance.
+STATES = 200
+
+
+class Columns(NamedTuple):
+    """The parameters of a model that a joint's force tells of, and their forces along a motion."""
+
+    attributes: Mapping[str, Attribute]
+    makers: Mapping[str, Callable[[Along], Parts]]
+
+    def along(self, seen: Along) -> list[Parts]:
+        """Rest and momentum of each, in the order of the attributes."""
+        return [self.makers[name](seen) for name in self.attributes]
+
+
+def distinct(mujoco: Any, model: Any, joint: int, name: str) -> Columns:
+    """The parameters that a joint's force depends on, one for each that no motion tells apart."""
+    every = {**_of_joint(mujoco, model, joint, name), **_of_bodies(mujoco, model, joint)}
+    draw = np.random.default_rng(0)
+    motion = Motion(*draw.uniform(-1.5, 1.5, (3, STATES, model.nv)))
+    seen = along(mujoco, model, motion)
+    attributes: dict[str, Attribute] = {}
+    directions: dict[str, np.ndarray] = {}
+    whole = np.linalg.norm(seen.force[:, joint])
+    for key, (attribute, maker) in every.items():
+        direction = np.concatenate(maker(seen))
+        size = np.linalg.norm(direction)
+        if size * (abs(attribute.value) or 1.0) <= SAME * whole:
+            continue
+        direction = direction / size
+        twin = next((k for k, d in directions.items() if abs(d @ direction) > 1 - SAME), None)
+        if twin is None:
+            attributes[key], directions[key] = attribute, direction
+        else:
+            own = attributes[twin]
+            attributes[twin] = own._replace(alike=(*own.alike, str(attribute)))
+    return Columns(attributes, {key: every[key][1] for key in attributes})
+
+
+def _of_joint(mujoco: Any, model: Any, joint: int, name: str):
+    per = "N·m·s/rad", "N·m/rad", "N·m", "kg·m²"
+    damping, stiffness, force, inertia = (
+        per if is_hinge(mujoco, model, joint) else ("N·s/m", "N/m", "N", "kg")
+    )
+    owner, centre = f"joint {name}", float(model.qpos_spring[joint])
+
+    def friction(seen: Along) -> Parts:
+        rms = float(np.sqrt(np.mean(seen.force[:, joint] ** 2)))
+        step = 0.1 * max(float(model.dof_frictionloss[joint]), 0.1 * rms, 1e-6)
+        more = with_friction(mujoco, model, seen.motion, joint, step)
+        return _resting((more - seen.friction[:, joint]) / step)
+
+    def armature(seen: Along) -> Parts:
+        speed = seen.motion.velocity[:, joint]
+        return np.zeros_like(speed), speed
+
+    found = {
+        "damping": (damping, model.dof_damping, lambda s: _resting(s.motion.velocity[:, joint])),
+        "frictionloss": (force, model.dof_frictionloss, friction),
+        "armature": (inertia, model.dof_armature, armature),
+        "stiffness": (
+            stiffness, model.jnt_stiffness, lambda s: _resting(s.motion.position[:, joint] - centre)
+        ),
+    }  # fmt: skip
+    named = {
+        f"joint/{name}/{what}": (
+            Attribute(owner, what, float(values[joint]), unit, rest=centre),
+            maker,
+        )
+        for what, (unit, values, maker) in found.items()
+    }
+    gear = Attribute(owner, "gain", 1.0, "1")
+    if (actuator := actuator_of(mujoco, model, joint)) is not None:
+        label = model.actuator(actuator).name or f"actuator{actuator + 1}"
+        gear = Attribute(f"actuator {label}", "gear", float(model.actuator_gear[actuator, 0]), "1")
+    return named | {GAIN: (gear, lambda s: (s.rest[:, joint], s.momentum[:, joint]))}
+
+
+def actuator_of(mujoco: Any, model: Any, joint: int) -> int | None:
+    """The only actuator that acts on a joint itself; `None` where there is none, or several."""
+    kind = int(mujoco.mjtTrn.mjTRN_JOINT)
+    own = [
+        i
+        for i in range(model.nu)
+        if int(model.actuator_trntype[i]) == kind and int(model.actuator_trnid[i, 0]) == joint
+    ]
+    return own[0] if len(own) == 1 else None
+
+
+def _of_bodies(mujoco: Any, model: Any, joint: int):
+    found = {}
+    for body in range(1, model.nbody):
+        if model.body_mass[body] <= 0 or joint not in _moved_by(model, body):
+            continue
+        label = model.body(body).name or f"body{body}"
+        own = weighed(mujoco, model, body)
+        values = {"mass": own[0], **_lettered("centre", own[1]), **_lettered("inertia", own[2])}
+        for what, slope in rigid.slopes(*own).items():
+            unit = {"mass": "kg", "centre": "m"}.get(what.partition("_")[0], "kg·m²")
+            words = what.replace("centre_", "centre of mass ").replace("_", " ")
+            attribute = Attribute(f"body {label}", words, float(values[what]), unit)
+            maker = _body(slope, body, joint, model.opt.gravity)
+            found[f"body/{label}/{what}"] = (attribute, maker)
+    return found
+
+
+def _lettered(what: str, values) -> dict[str, float]:
+    return {f"{what}_{letter}": float(v) for letter, v in zip("xyz", values, strict=True)}
+
+
+def _body(slope, body: int, joint: int, gravity) -> Callable[[Along], Parts]:
+    def parts(seen: Along) -> Parts:
+        rest, momentum = rigid.regressor(seen.frames[body - 1], slope, gravity)
+        return rest[:, joint], momentum[:, joint]
+
+    return parts
+
+
+def _moved_by(model: Any, body: int) -> set[int]:
+    """The joints between a body and the world."""
+    found: set[int] = set()
+    while body:
+        first = int(model.body_jntadr[body])
+        found |= set(range(first, first + int(model.body_jntnum[body])))
+        body = int(model.body_parentid[body])
+    return found
+
+
+def _resting(values: np.ndarray) -> Parts:
+    return values, np.zeros_like(values)

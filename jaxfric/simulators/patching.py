@@ -1,0 +1,205 @@
+"""A model's file with some of its values changed, and nothing else."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .inverse import weighed
+from .loading import is_hinge, is_text, joints_of, read
+from .tags import Bodies, Tag, bodies, edited, tags
+
+# What a file's number may differ from the value that it stands for, relative.
+ROUNDING = 1e-5
+
+
+class Patched(NamedTuple):
+    """A model's text, the attributes that were changed in it, and what could not be, with why."""
+
+    text: str
+    written: tuple[str, ...]
+    left: Mapping[str, str]
+
+
+def patched(
+    mujoco: Any, source: str | Path, values: Mapping[str, float], folder: Path | None = None
+) -> Patched:
+    """The model with other values of its attributes, `joint/elbow/damping` for instance.
+
+    A URDF becomes a MuJoCo model, for it has no stiffness and no armature. Each change is read back
+    by MuJoCo; what it does not take is not written. `folder`: in which a text's meshes lie.
+    """
+    folder = folder or folder_of(source)
+    text, model = _text(mujoco, source), read(mujoco, source, folder)
+    written: list[str] = []
+    left: dict[str, str] = {}
+    for group in _groups(values):
+        try:
+            changed = _changed(mujoco, text, model, group)
+            _check(mujoco, read(mujoco, changed, folder), model, group)
+        except ValueError as error:
+            left |= dict.fromkeys(group, str(error))
+            continue
+        text = changed
+        written += group
+    return Patched(text, tuple(written), left)
+
+
+def _text(mujoco: Any, source: str | Path) -> str:
+    """The model's MJCF; of a URDF that of MuJoCo's own translation."""
+    text = str(source) if is_text(source) else Path(source).read_text(encoding="utf-8")
+    if tags(text)[0].name == "mujoco":
+        return text
+    if is_text(source):
+        spec = mujoco.MjSpec.from_string(text)
+    else:
+        spec = mujoco.MjSpec.from_file(str(source))
+    spec.compile()
+    return spec.to_xml()
+
+
+def folder_of(source: str | Path) -> Path | None:
+    """Where the meshes of a model's file lie."""
+    return None if is_text(source) else Path(source).resolve().parent
+
+
+def _groups(values: Mapping[str, float]) -> list[dict[str, float]]:
+    """Changes that belong together: those of one body's weight, those of one spring."""
+    found: dict[str, dict[str, float]] = {}
+    for key, value in values.items():
+        kind, owner, what = key.split("/")
+        whole = kind == "body" or what in ("stiffness", "springref")
+        found.setdefault(f"{kind}/{owner}" if whole else key, {})[key] = value
+    return list(found.values())
+
+
+def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> str:
+    found = tags(text)
+    tree = bodies(found)
+    names = joints_of(mujoco, model)
+    if len(tree.bodies) != model.nbody - 1 or len(tree.joints) != model.njnt:
+        raise ValueError(
+            "its bodies are not all written out in this file (include, replicate, attach)"
+        )
+    changes: dict[int, dict[str, str | None]] = {}
+    new: dict[int, str] = {}
+    kind, owner, _ = next(iter(group)).split("/")
+    own = {key.split("/")[2]: value for key, value in group.items()}
+    if kind == "joint":
+        joint = names.index(owner)
+        changes[tree.joints[joint]] = _of_joint(mujoco, model, joint, own, found)
+    elif kind == "actuator":
+        changes |= _of_actuator(mujoco, model, owner, own["gear"], found)
+    else:
+        body = next(b for b in range(1, model.nbody) if (model.body(b).name or f"body{b}") == owner)
+        _of_body(mujoco, model, body, own, found, tree, changes, new)
+    return edited(text, changes, new)
+
+
+def _number(value: float) -> str:
+    return f"{value:.7g}"
+
+
+def _of_joint(mujoco: Any, model: Any, joint: int, own: Mapping[str, float], found: list[Tag]):
+    if any(value < 0 for name, value in own.items() if name != "springref"):
+        raise ValueError("it would be below zero")
+    degrees = is_hinge(mujoco, model, joint) and _in_degrees(found)
+    scale = 180 / np.pi if degrees else 1.0
+    return {
+        name: _number(value * (scale if name == "springref" else 1.0))
+        for name, value in own.items()
+    }
+
+
+def _in_degrees(found: list[Tag]) -> bool:
+    angles = [
+        t.attributes["angle"] for t in found if t.name == "compiler" and "angle" in t.attributes
+    ]
+    return not angles or angles[-1] != "radian"
+
+
+def _of_actuator(mujoco: Any, model: Any, owner: str, gear: float, found: list[Tag]):
+    section = [i for i, tag in enumerate(found) if tag.name == "actuator"]
+    own = [i for i, tag in enumerate(found) if tag.parent in section]
+    number = next(
+        i for i in range(model.nu) if (model.actuator(i).name or f"actuator{i + 1}") == owner
+    )
+    if len(own) != model.nu:
+        raise ValueError("its actuators are not all written out in this file")
+    before = found[own[number]].attributes.get("gear", "1").split()
+    return {own[number]: {"gear": " ".join([_number(gear), *before[1:]])}}
+
+
+def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, new) -> None:
+    """The weight of a body: its geom's mass, or its `inertial`, there already or added."""
+    mass, centre, inertia, _ = _wanted(mujoco, model, body, own)
+    children = tree.children[body - 1]
+    geoms = children["geom"]
+    if set(own) == {"mass"} and not children["inertial"] and len(geoms) == 1:
+        if "mass" in found[geoms[0]].attributes:
+            changes[geoms[0]] = {"mass": _number(mass)}
+            return
+    written: dict[str, str | None] = {
+        "mass": _number(mass),
+        "pos": " ".join(map(_number, centre)),
+        "diaginertia": " ".join(map(_number, inertia)),
+    }
+    if children["inertial"]:
+        tag = found[children["inertial"][0]]
+        kept = {} if set(own) - {"mass"} else {"pos"}
+        if "fullinertia" in tag.attributes:
+            written |= {"fullinertia": None, "quat": _quat(model, body)}
+        changes[children["inertial"][0]] = {k: v for k, v in written.items() if k not in kept}
+        return
+    written["quat"] = _quat(model, body)
+    inner = " ".join(f'{name}="{value}"' for name, value in written.items())
+    new[tree.bodies[body - 1]] = f"<inertial {inner}/>"
+
+
+def _quat(model: Any, body: int) -> str:
+    return " ".join(map(_number, model.body_iquat[body]))
+
+
+def _wanted(mujoco: Any, model: Any, body: int, own: Mapping[str, float]):
+    """Mass, centre and principal inertias, with the values that are given: the mass first."""
+    mass, centre, inertia, axes = weighed(mujoco, model, body)
+    if "mass" in own:
+        mass, inertia = own["mass"], inertia * own["mass"] / mass
+    if mass <= 0:
+        raise ValueError("it would be below zero")
+    for k, letter in enumerate("xyz"):
+        centre[k] = own.get(f"centre_{letter}", centre[k])
+        inertia[k] = own.get(f"inertia_{letter}", inertia[k])
+    return mass, centre, inertia, axes
+
+
+def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
+    """Raise `ValueError` where MuJoCo reads another value than was meant."""
+    names = joints_of(mujoco, new)
+    for key, value in group.items():
+        kind, owner, what = key.split("/")
+        if kind == "joint":
+            joint = names.index(owner)
+            place = {
+                "stiffness": new.jnt_stiffness, "springref": new.qpos_spring,
+                "damping": new.dof_damping, "frictionloss": new.dof_frictionloss,
+                "armature": new.dof_armature,
+            }  # fmt: skip
+            read_back = float(place[what][joint])
+        elif kind == "actuator":
+            read_back = float(new.actuator_gear[new.actuator(owner).id, 0])
+        else:
+            body = next(b for b in range(1, new.nbody) if (new.body(b).name or f"body{b}") == owner)
+            whole = _wanted(mujoco, old, body, {k.split("/")[2]: v for k, v in group.items()})
+            there = weighed(mujoco, new, body)
+            same = (
+                np.isclose(there[0], whole[0], rtol=ROUNDING)
+                and np.allclose(there[1], whole[1], rtol=ROUNDING, atol=ROUNDING)
+                and np.allclose(there[2], whole[2], rtol=1e-3)
+            )
+            if not same:
+                raise ValueError("MuJoCo takes the body's weight from elsewhere (inertiafromgeom)")
+            continue
+        if abs(read_back - value) > ROUNDING * max(abs(value), 1e-6):
+            raise ValueError(f"MuJoCo reads {read_back:.6g} for it")

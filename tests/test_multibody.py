@@ -1,0 +1,92 @@
+"""A multibody model's force in two parts, and by its own parameters, held against MuJoCo's own."""
+
+import numpy as np
+import pytest
+
+from jaxfric.simulators.columns import GAIN, distinct
+from jaxfric.simulators.inverse import Motion, along
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0" damping="0.1"
+ armature="0.02" frictionloss="0.3"/>
+ <geom type="capsule" fromto="0 0 0 .3 0 .1" size=".02" mass="1"/>
+ <body name="fore" pos=".3 0 .1" euler="20 30 0">
+ <joint name="elbow" axis="1 0 1" stiffness="2" springref="10" frictionloss="0.1"/>
+ <inertial pos=".1 .02 .03" mass="2" diaginertia=".02 .03 .04" euler="10 20 30"/>
+ <body name="hand" pos=".1 0 0"><joint name="grip" type="slide" axis="0 1 0" stiffness="3"/>
+ <geom type="box" size=".1 .02 .05" pos=".1 0 0" mass="3"/></body></body></body></worldbody>
+ <actuator><motor name="drive" joint="elbow" gear="40"/></actuator></mujoco>"""
+
+
+def smooth(model, count=400, step=1e-3):
+    """Positions, velocities and accelerations of sine waves, exactly."""
+    draw = np.random.default_rng(0)
+    time = step * np.arange(count)[:, None]
+    rate, phase = draw.uniform(1, 5, model.nv), draw.uniform(0, 6, model.nv)
+    angle = rate * time + phase
+    return Motion(np.sin(angle), rate * np.cos(angle), -(rate**2) * np.sin(angle))
+
+
+def slope(values, step=1e-3):
+    """The derivative of fourth order; two at each end are lost."""
+    inner = 8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])
+    return inner / (12 * step)
+
+
+def test_the_force_is_a_rest_and_the_rate_of_a_momentum():
+    model = mujoco.MjModel.from_xml_string(ARM)
+    seen = along(mujoco, model, smooth(model))
+    both = seen.rest[2:-2] + slope(seen.momentum)
+    np.testing.assert_allclose(both, seen.force[2:-2], atol=1e-6 * np.abs(seen.force).max())
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+def test_columns_are_the_derivatives_of_the_simulators_force(joint):
+    model = mujoco.MjModel.from_xml_string(ARM)
+    motion, name = smooth(model, 60), ("shoulder", "elbow", "grip")[joint]
+    seen = along(mujoco, model, motion)
+    found = distinct(mujoco, model, joint, name)
+    for key, (rest, momentum) in zip(found.attributes, found.along(seen), strict=True):
+        column = rest[2:-2] + slope(momentum)
+        if key == GAIN:
+            expected = seen.force[:, joint]
+        else:
+            step = 1e-5
+            moved = [_moved(model, key, joint, sign * step) for sign in (1, -1)]
+            pair = [along(mujoco, other, motion).force[:, joint] for other in moved]
+            expected = (pair[0] - pair[1]) / (2 * step)
+        np.testing.assert_allclose(
+            column, expected[2:-2], atol=1e-4 * max(np.abs(expected).max(), 1), err_msg=key
+        )
+
+
+def _moved(model, key, joint, step):
+    """The model with one of its own values moved."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    kind, owner, what = key.split("/")
+    if kind == "joint":
+        values = model.jnt_stiffness if what == "stiffness" else getattr(model, f"dof_{what}")
+        values[joint] += step
+        return model
+    body = model.body(owner).id
+    if what == "mass":
+        model.body_inertia[body] *= 1 + step / model.body_mass[body]
+        model.body_mass[body] += step
+    else:
+        values = model.body_ipos if what.startswith("centre") else model.body_inertia
+        values[body, "xyz".index(what[-1])] += step
+    return model
+
+
+def test_what_no_motion_tells_apart_is_one_column():
+    """Of the last joint's body the inertia about its axis is as its armature."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    found = distinct(mujoco, model, 2, "grip")
+    assert found.attributes["joint/grip/armature"].alike == ()  # a mass has weight, too
+    single = ARM.replace('<body name="hand" pos=".1 0 0"><joint name="grip"', "<!--").replace(
+        "</body></body></body>", "--></body></body>"
+    )
+    model = mujoco.MjModel.from_xml_string(single)
+    assert "body/upper/mass" not in distinct(mujoco, model, 1, "elbow").attributes
+    assert distinct(mujoco, model, 1, "elbow").attributes[GAIN].owner == "actuator drive"

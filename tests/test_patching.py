@@ -1,0 +1,227 @@
+"""A simulator's file put right: only what was meant is changed, and MuJoCo reads it back."""
+
+import difflib
+import math
+
+import numpy as np
+import pytest
+
+from jaxfric import models, terms
+from jaxfric.data.joints import columns_of
+from jaxfric.data.tables import load
+from jaxfric.export.callback import callback
+from jaxfric.simulators import Mujoco
+from jaxfric.simulators.patching import patched
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco model="arm">
+  <!-- kept as it is: 2 > 1 -->
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 1 0" damping="0.8"
+             armature='0.05'/>
+      <geom fromto="0 0 0 0.3 0 0" type="capsule" size="0.03" mass="2.0"/>
+      <frame>
+        <body name="forearm" pos="0.3 0 0">
+          <joint name="elbow" axis="0 1 0" damping="0.5"/>
+          <inertial pos="0.1 0 0" mass="1.2" diaginertia="0.01 0.01 0.001"/>
+        </body>
+      </frame>
+    </body>
+  </worldbody>
+  <actuator><motor name="m" joint="elbow" gear="5 0 0 0 0 0"/></actuator>
+</mujoco>
+"""
+
+
+def changed(values, text=ARM):
+    done = patched(mujoco, text, values)
+    lines = difflib.unified_diff(text.splitlines(), done.text.splitlines(), lineterm="", n=0)
+    return done, [line[1:].strip() for line in list(lines)[2:] if line[0] == "+"]
+
+
+def test_one_attribute_is_one_attribute():
+    done, lines = changed({"joint/shoulder/armature": 0.07})
+    assert done.written == ("joint/shoulder/armature",) and not done.left
+    assert lines == ['armature="0.07"/>']
+    done, lines = changed({"joint/elbow/frictionloss": 0.3})
+    assert lines == ['<joint name="elbow" axis="0 1 0" damping="0.5" frictionloss="0.3"/>']
+    assert changed({})[0].text == ARM
+
+
+def test_a_mass_takes_its_inertia_along():
+    done, lines = changed({"body/forearm/mass": 1.8})
+    assert lines == ['<inertial pos="0.1 0 0" mass="1.8" diaginertia="0.015 0.015 0.0015"/>']
+    done, lines = changed({"body/upper/mass": 2.5})
+    assert lines == ['<geom fromto="0 0 0 0.3 0 0" type="capsule" size="0.03" mass="2.5"/>']
+    done, lines = changed({"body/upper/centre_x": 0.2})
+    assert len(lines) == 1 and lines[0].startswith('<inertial mass="2" pos="0.2 0 0"')
+    model = mujoco.MjModel.from_xml_string(done.text)
+    np.testing.assert_allclose(model.body_ipos[1], [0.2, 0, 0])
+
+
+def test_a_spring_is_written_in_the_files_own_unit():
+    values = {"joint/elbow/stiffness": 3.0, "joint/elbow/springref": 0.4}
+    done, lines = changed(values)
+    assert f'springref="{math.degrees(0.4):.7g}"' in lines[0]
+    model = mujoco.MjModel.from_xml_string(done.text)
+    assert model.qpos_spring[1] == pytest.approx(0.4) and model.jnt_stiffness[1] == 3.0
+    radian = ARM.replace("<worldbody>", '<compiler angle="radian"/><worldbody>', 1)
+    assert 'springref="0.4"' in changed(values, radian)[1][0]
+
+
+def test_a_gear_keeps_its_other_numbers_and_what_is_none_is_left():
+    done, lines = changed({"actuator/m/gear": 4.5, "joint/elbow/damping": -0.1})
+    assert 'gear="4.5 0 0 0 0 0"' in lines[0] and done.written == ("actuator/m/gear",)
+    assert "below zero" in done.left["joint/elbow/damping"]
+
+
+def test_what_another_file_holds_is_left(tmp_path):
+    (tmp_path / "body.xml").write_text(
+        '<mujocoinclude><body name="b"><joint name="j"/><geom size=".1"/></body></mujocoinclude>'
+    )
+    whole = tmp_path / "robot.xml"
+    whole.write_text(
+        '<mujoco><worldbody><include file="body.xml"/></worldbody></mujoco>', encoding="utf-8"
+    )
+    done = patched(mujoco, whole, {"joint/j/damping": 1.0})
+    assert done.written == () and "include" in done.left["joint/j/damping"]
+    assert done.text == whole.read_text()
+
+
+def test_a_urdf_becomes_a_model_of_mujoco(tmp_path):
+    inertia = '<inertia ixx=".01" iyy=".02" izz=".02" ixy="0" ixz="0" iyz="0"/>'
+    link = f'<link name="l"><inertial><origin xyz=".1 0 0"/><mass value="1"/>{inertia}</inertial>'
+    joint = '<joint name="j" type="continuous"><parent link="b"/><child link="l"/>'
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        f'<robot name="r"><link name="b"/>{link}</link>{joint}<axis xyz="0 1 0"/></joint></robot>'
+    )
+    done = patched(mujoco, path, {"joint/j/stiffness": 2.0, "body/l/mass": 1.5})
+    model = mujoco.MjModel.from_xml_string(done.text)
+    assert model.jnt_stiffness[0] == 2.0 and model.body_mass[1] == 1.5 and not done.left
+    # Without friction a heavier link is as a force that is read too large.
+    assert Mujoco(path).attributes()["gain"].alike == ("mass of body l",)
+
+
+def test_the_callback_takes_the_terms_force_off_the_joint():
+    units = {"force": "N·m", "position": "rad"}
+    cogging = models.from_parameters(
+        terms.Cogging(), {"cogging_sin": 0.3, "cogging_cos": -0.1, "pitch": 0.5}, units
+    )
+    text = callback({"elbow": cogging}, {"elbow": 2.0}, "arm_forces.py")
+    space: dict = {}
+    exec(compile(text, "arm_forces.py", "exec"), space)
+    x = np.linspace(-1, 1, 7)
+    expected = 0.3 * np.sin(4 * np.pi * x) - 0.1 * np.cos(4 * np.pi * x)
+    found = [space["FORCES"]["elbow"](value, 1.0, 0.0) for value in x]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    data.qpos[1] = 0.07
+    space["install"](mujoco)
+    try:
+        mujoco.mj_forward(model, data)
+    finally:
+        mujoco.set_mjcb_passive(None)
+    assert data.qfrc_passive[1] == pytest.approx(-space["FORCES"]["elbow"](0.07, 0.0, 0.0))
+    assert 'from_xml_path("arm.xml")' in text
+
+
+# ---- whose a column is ----
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["shoulder_position", "elbow_position", "shoulder_effort", "elbow_effort"],
+        ["shoulder/pos", "elbow/pos", "shoulder/tau", "elbow/tau"],
+        ["/joint_states/shoulder/position", "/joint_states/elbow/position",
+         "/joint_states/shoulder/effort", "/joint_states/elbow/effort"],
+        ["q1", "q2", "tau1", "tau2"],
+        ["q:1", "q:2", "tau:1", "tau:2"],
+        ["q[0]", "q[1]", "current[0]", "current[1]"],
+        ["q_shoulder [rad]", "q_elbow [rad]", "torque_shoulder [Nm]", "torque_elbow [Nm]"],
+    ],
+)  # fmt: skip
+def test_columns_of_joints_by_name_and_by_number(names):
+    found = columns_of(["time", *names, "elbow_position_cmd"], ["shoulder", "elbow"], {}, "log")
+    pairs = zip(names[:2], names[2:], strict=True)
+    expected = [{"position": position, "force": force} for position, force in pairs]
+    assert [found["shoulder"], found["elbow"]] == expected
+
+
+def test_columns_of_joints_that_are_said():
+    names = ["t", "q1", "q2", "tau1", "tau2"]
+    found = columns_of(names, ["shoulder", "elbow"], {"shoulder": "q2", "elbow": "q1"}, "log")
+    assert found["shoulder"] == {"position": "q2", "force": "tau2"}
+    with pytest.raises(ValueError, match=r"no column 'q9' for shoulder"):
+        columns_of(names, ["shoulder", "elbow"], {"shoulder": "q9"}, "log")
+    with pytest.raises(ValueError, match=r"elbow_force=elbow_effort"):
+        columns_of(["elbow_pos", "elbow_effort", "elbow_torque"], ["elbow"], {}, "log")
+
+
+# ---- forms in which robots are logged ----
+
+
+def joint_arrays(count=50):
+    time = 0.01 * np.arange(count)
+    return time, np.stack([np.sin(time), np.cos(time)], 1), np.stack([time, 2 * time], 1)
+
+
+def test_arrays_of_all_joints_have_their_names(tmp_path):
+    time, q, tau = joint_arrays()
+    path = tmp_path / "log.npz"
+    np.savez(path, t=time, q=q, tau=tau, joint_names=np.array(["shoulder", "elbow"]))
+    table = load(path)
+    assert set(table.columns) == {"t", "shoulder/q", "elbow/q", "shoulder/tau", "elbow/tau"}
+    np.testing.assert_array_equal(table.columns["elbow/tau"], tau[:, 1])
+    np.savez(path, t=time, q=q, tau=tau)
+    found = columns_of(load(path).columns, ["shoulder", "elbow"], {}, "log")
+    assert found["elbow"] == {"position": "q:2", "force": "tau:2"}
+
+
+@pytest.mark.parametrize("kind", ["SQLITE3", "MCAP"])
+def test_joint_states_of_a_bag(tmp_path, kind):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store, (time, q, tau) = get_typestore(Stores.ROS2_HUMBLE), joint_arrays()
+    header, stamp, state = (
+        store.types[name]
+        for name in (
+            "std_msgs/msg/Header",
+            "builtin_interfaces/msg/Time",
+            "sensor_msgs/msg/JointState",
+        )
+    )
+    path = tmp_path / "bag"
+    plugin = getattr(rosbag2.StoragePlugin, kind)
+    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
+        topic = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+        for i in range(len(time)):
+            at = 10**18 + round(time[i] * 1e9)
+            own = header(stamp(at // 10**9, at % 10**9), "")
+            message = state(own, ["shoulder", "elbow"], q[i], np.zeros(0), tau[i])
+            writer.write(topic, at + 5, store.serialize_cdr(message, state.__msgtype__))
+    table = load(path)
+    np.testing.assert_allclose(table.columns["time"], time, atol=1e-9)
+    np.testing.assert_array_equal(table.columns["elbow/effort"], tau[:, 1])
+    assert "elbow/velocity" not in table.columns
+    found = columns_of(table.columns, ["shoulder", "elbow"], {}, "bag")
+    assert found["shoulder"] == {"position": "shoulder/position", "force": "shoulder/effort"}
+
+
+def test_without_its_reader_a_bag_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "rosbags", None)
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(ValueError, match=r"jaxfric\[ros\]"):
+        load(tmp_path / "log.mcap")
+
+
+def test_a_damaged_bag_is_refused(tmp_path):
+    pytest.importorskip("rosbags")
+    (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(ValueError, match="no readable bag"):
+        load(tmp_path / "log.mcap")
