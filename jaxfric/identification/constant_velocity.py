@@ -2,7 +2,8 @@
 
 At constant velocity the force is the friction. Here the mean force is taken over stretches whose
 velocity stays in a narrow band and ends at the level at which it began, so that acceleration has no
-part in it, whatever the mass. No model and no fit enters: the points are evidence beside the curve.
+part in it, whatever the mass. No model enters. The paper holds each speed in runs of their own; in
+the recording that was identified the fit saw the same samples, so another one is better evidence.
 """
 
 from collections.abc import Sequence
