@@ -1,10 +1,13 @@
 """The commands but the demo: identify, predict, simulate, models."""
 
 import dataclasses
+import os
 import sys
+import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 

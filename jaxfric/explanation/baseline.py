@@ -12,6 +12,7 @@ from ..identification.identified import Identified
 from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
+from . import parameters as spelled
 from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
 from .naming import LEAST_SHARE, LINEARITY

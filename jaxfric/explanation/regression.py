@@ -90,17 +90,13 @@ def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def _forces_of_bumps(terms: Sequence[AbstractTerm]) -> np.ndarray:
     """Which affine parameters are forces of friction with a shape that is searched, `(p,)`."""
-    parts = [part for term in terms for part in summands(term)]
-    return np.concatenate(
-        [
-            [
-                bool(part.nonlinear) and part.coordinates == {"velocity"} and p.dimension == FORCE
-                for p in part.affine
-            ]
-            for part in parts
-        ]
-        or [np.zeros(0, bool)]
-    ).astype(bool)
+    which = [
+        bool(part.nonlinear) and part.coordinates == {"velocity"} and each.dimension == FORCE
+        for term in terms
+        for part in summands(term)
+        for each in part.affine
+    ]
+    return np.array(which, bool)
 
 
 def bounded(columns: np.ndarray, target: np.ndarray, which: np.ndarray, peak: float) -> np.ndarray:

@@ -36,7 +36,9 @@ def checked(
     for i in range(len(warnings)):
         row, own, where = jax.tree.map(lambda x, i=i: x[i], host) if faults.ndim == 2 else host
         fitted = checks.fitted(own, float(row.force_error))
-        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, *where, *_certain(row)):
+        time, position, mask = where
+        alpha, sure = _certain(row)
+        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
             fitted[STRUCTURE] = float(row.force_error)
         warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         if (negative := _negative(row)) > 0:

@@ -48,7 +48,7 @@ def draw_concealed(rng: Generator) -> Pair:
         }  # fmt: skip
         columns = {role: np.asarray(x, float)[:count] for role, x in columns.items()}
         # The force is held from its sample to the next: the mean of both neighbours is centred.
-        force = columns["force"]
+        force = np.asarray(columns["force"])
         columns["force"] = 0.5 * (force + np.append(force[0], force[:-1]))
         logs.append(Log(columns, names, truth, top, hard, cycle, machine.baseline, about))
     return Pair(*logs)
