@@ -304,3 +304,22 @@ def test_what_repeats_with_the_place_may_hide_a_parameter_and_noise_does_not(see
     assert hidden(lambda x, v: 1.0 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.05 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.6 * draw.normal(size=len(x)))
+
+
+def test_a_number_for_a_missing_force_is_told_and_a_drive_that_is_off_is_not():
+    sound = log()
+    force = np.array(sound.force)
+    speed = np.abs(np.gradient(np.asarray(sound.position)))
+    force[speed < np.quantile(speed, 0.1)] = 0.0
+    assert "force_filler" not in names(changed(sound, force=force))
+    force = np.array(sound.force)
+    force[np.random.default_rng(0).random(len(force)) < 0.05] = -1.1 * np.max(np.abs(force)) / 2
+    assert "force_filler" in names(changed(sound, force=force))
+
+
+def test_a_force_drawn_finer_than_it_was_logged_is_told():
+    sound = log()
+    time, force = np.asarray(sound.time), np.asarray(sound.force)
+    for every, told in ((40, True), (4, False)):
+        fine = np.interp(time, time[::every], force[::every])
+        assert ("force_interpolated" in names(changed(sound, force=fine))) == told

@@ -113,6 +113,19 @@ KINDS = (
         "the motion, and late by half of that. Log both at one rate, or the motion at the force's.",
     ),
     Kind(
+        "force_interpolated",
+        False,
+        "The force is straight over {value:.0f} samples at a time: logged at a slower rate and "
+        "drawn finer afterwards, so that there is nothing to filter between two samples. Give the "
+        "log at its own rate.",
+    ),
+    Kind(
+        "force_filler",
+        False,
+        "The force is exactly {value:.10g} again and again, with a jump before and after: a number "
+        "written where none was measured. Empty these cells, which masks them.",
+    ),
+    Kind(
         "force_wraps",
         False,
         "At {value:.0f} samples the force jumps across its whole range in full motion: its numbers "

@@ -57,6 +57,12 @@ FROZEN = 0.1
 # Of a force held from one update to the next so many stretches last as long as the others, within
 # a sample; those of a coarse count last as long as the force is slow.
 HELD = 0.8
+# No measured value comes twenty times as often as the next one, and between two samples a drive's
+# force changes by less than half of its size, as a rule.
+OFTEN, JUMP = 20, 0.5
+# Between the corners of a signal that was interpolated its bend is rounding. Half the shortest
+# kernel has to hold four of its own samples: its width is chosen by their noise.
+STRAIGHT, DRAWN = 1e-4, CYCLE / 4
 # A delay counts where it changes the force by a twentieth of its size.
 SHIFTED = 0.05
 # An overflow crosses this share of the range between two samples, far from any reversal.
@@ -127,7 +133,8 @@ def _force(recording: Recording, velocity: np.ndarray, valid: np.ndarray) -> dic
     across = step & linked & fast[1:] & fast[:-1] & (np.sign(velocity[1:] * velocity[:-1]) > 0)
     if np.count_nonzero(across) > LONE:
         found["force_wraps"] = int(np.count_nonzero(across))
-    found |= _held(force)
+    found |= _held(force) or _interpolated(force)
+    found |= _filler(force, speed[valid])
     return found | ({} if "force_clipped" in found else _frozen(force, velocity[valid]))
 
 
@@ -154,6 +161,35 @@ def _held(force: np.ndarray) -> dict[str, float]:
     # It is late by (n - 1)/2 samples.
     moved = 0.5 * (usual - 1) / usual * (force[usual:] - force[:-usual])
     return {"force_held": usual} if np.std(moved) > SHIFTED * np.std(force) else {}
+
+
+def _interpolated(force: np.ndarray) -> dict[str, float]:
+    """Over how many samples a force is straight, where a kernel is not much wider."""
+    bend = np.abs(np.diff(force, 2))
+    corners = np.flatnonzero(bend > STRAIGHT * np.max(bend, initial=0.0))
+    # A corner between two samples bends at both.
+    lengths = np.diff(corners[np.diff(corners, prepend=-2) > 1])
+    if len(lengths) <= PIECE:
+        return {}
+    usual = float(np.median(lengths))
+    even = np.mean(np.abs(lengths - usual) <= 1) >= HELD
+    return {"force_interpolated": usual} if usual > DRAWN and even else {}
+
+
+def _filler(force: np.ndarray, speed: np.ndarray) -> dict[str, float]:
+    """The number that stands where no force was measured, at full speed too: a drive that is
+    switched off at rest says zero.
+    """
+    values, counts = np.unique(force, return_counts=True)
+    order = np.argsort(counts)[-2:]
+    if len(order) < 2 or counts[order[1]] < max(CLIPPED * len(force), OFTEN * counts[order[0]]):
+        return {}
+    value = float(values[order[1]])
+    ends = np.flatnonzero(np.diff(force == value))
+    jumps = np.abs(np.diff(force))[ends]
+    size = float(np.sqrt(np.mean((force - np.mean(force)) ** 2)))
+    moves = np.median(speed[force == value]) > FAR * np.quantile(speed, 0.98)
+    return {"force_filler": value} if moves and np.median(jumps) > JUMP * size else {}
 
 
 def _same(recording: Recording, velocity: np.ndarray, valid: np.ndarray) -> dict[str, float]:
