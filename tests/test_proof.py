@@ -380,6 +380,7 @@ def quick(monkeypatch, hook, tmp_path):
 @dataclasses.dataclass(frozen=True)
 class Log:
     source: str
+    sha256: str = ""
 
 
 @dataclasses.dataclass(frozen=True)
