@@ -228,6 +228,8 @@ def _misshapen(model: Model, velocity, force, half) -> bool:
     if model.term.nonlinear:
         columns.append(np.nan_to_num(np.asarray(jax.jacfwd(at)(model.term.beta()))))
     design = np.concatenate(columns, axis=1) / half[:, None]
+    if not np.isfinite(design).all():
+        return False
     solved = np.linalg.lstsq(design, force / half, rcond=1e-9)[0]
     left = np.abs(force / half - design @ solved)
     return bool(np.any((left > 1) & (left * half > MATTERS * np.abs(force))))
