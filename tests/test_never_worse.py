@@ -228,3 +228,18 @@ def test_a_robots_joint_is_never_made_worse(data_folder, baseline, force):
     found = explain(run, baseline)
     never_worse(found)
     assert by_hand(found.model, run) == pytest.approx(found.fit["force_error"]["after"], rel=1e-9)
+
+
+def test_a_narrow_bump_is_no_higher_than_the_largest_force():
+    """A column that the rows hardly see would take any height for a little noise."""
+    draw = np.random.default_rng(0)
+    columns = np.stack([np.ones(200), np.where(np.arange(200) == 7, 1e-3, 0.0)], axis=1)
+    target = 3.0 * columns[:, 0] + 0.1 * draw.normal(size=200)
+    target[7] += 0.5
+    assert abs(regression.solve(columns, target)[1]) > 100
+    held = regression.bounded(columns, target, np.array([False, True]), 4.0)
+    assert abs(held[1]) == 4.0 and abs(held[0] - 3.0) < 0.05
+    np.testing.assert_allclose(
+        regression.bounded(columns, target, np.array([False, False]), 4.0),
+        regression.solve(columns, target),
+    )
