@@ -110,6 +110,7 @@ ARGUMENTS = ("--position=0.05", "--velocity=0.2", "--acceleration=2", "--jerk=60
              "--duration=4", "--interval=0.004")  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     model = cogging()
