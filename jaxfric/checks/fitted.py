@@ -19,8 +19,8 @@ SPLITS = tuple(i / 10 for i in range(1, 10))
 # A tenth of the force, a hundredth of its power, is more than any filter or ripple of the log
 # leaves; it is structure where it has twice the power of what neighbouring rows differ by.
 LEFT, ROUGH = 0.1, 2.0**0.5
-# Of a third of the force, a tenth of its power, everyone wants to know, noise or not.
-LARGE = 0.3
+# Of a quarter of the force everyone wants to know, noise or not.
+LARGE = 0.25
 
 
 class Design(NamedTuple):
