@@ -6,8 +6,9 @@ from .fitted import HALF, Design
 
 # Of so many rows each is compared with all others.
 MOST = 1500
-# Rows share samples with so many neighbours; how the axis moves between them is its velocity.
-NEAR = 3
+# Rows share samples with so many neighbours on either side; of fewer than ten such stretches too few
+# are left to find the same place and speed again.
+NEAR, FEWEST = 3, 30
 
 
 def hides(
@@ -33,7 +34,7 @@ def hides(
     size = np.linalg.norm(columns, axis=0)
     if (
         position is None
-        or len(rows) < 10 * NEAR
+        or len(rows) < FEWEST
         or not sure
         or not np.all(np.isfinite(columns))
         or not size.all()
