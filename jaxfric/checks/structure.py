@@ -6,8 +6,8 @@ from .fitted import HALF, Design
 
 # Of so many rows each is compared with all others.
 MOST = 1500
-# Rows share samples with so many neighbours on either side; of fewer than ten such stretches too few
-# are left to find the same place and speed again.
+# Rows share samples with so many neighbours on either side; in fewer than ten such stretches the
+# same place and speed hardly come again.
 NEAR, FEWEST = 3, 30
 
 
