@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     )
     from .identification.identified import Identified as Identified, Result as Result
     from .identification.identifying import identify as identify
+    from .identification.presliding import Presliding as Presliding, presliding as presliding
     from .identification.projections import ClosedWindows as ClosedWindows, WeakForm as WeakForm
     from .identification.selection import Selection as Selection, select as select
     from .identification.uncertainty import Estimate as Estimate
@@ -59,6 +60,7 @@ _NAMES = {
     "identification.constant_velocity": ("ConstantVelocity", "constant_velocity"),
     "identification.identified": ("Identified", "Result"),
     "identification.identifying": ("identify",),
+    "identification.presliding": ("Presliding", "presliding"),
     "identification.projections": ("ClosedWindows", "WeakForm"),
     "identification.selection": ("Selection", "select"),
     "identification.uncertainty": ("Estimate",),

@@ -20,10 +20,13 @@ from .data.printable import listed, short
 from .data.recording import Recording, described
 from .looks import html, text
 from .looks.text import Block, Table
+from .terms import bristles
 from .terms.base import AbstractTerm, Directional, Sum, summands
-from .units import SI, spell
+from .units import DAMPING, SI, STIFFNESS, spell
 
 SCHEMA = "jaxfric.model/1"
+# Their names and dimensions: force, position, time.
+_BRISTLES = {"stiffness": STIFFNESS, "damping": DAMPING}
 
 
 class Model(eqx.Module):
@@ -32,7 +35,11 @@ class Model(eqx.Module):
     **Arguments:** `term`, any term or sum, its leaves the nonlinear parameters β; `alpha`, the
     affine parameters in the order of `term.affine`, shape `(p,)`; `units`, names of the force
     and position unit. A parameter that is not known, of a direction that nothing moved in, is NaN;
-    so is the force wherever it would count, and only there.
+    so is the force wherever it would count, and only there. `breakaway`: the forces F_slip(0−) and
+    F_slip(0+) of Kim, Kim & Ha (2004), eq. (4), at which the axis breaks away, N, shape `(2,)`,
+    where they were measured; NaN or `None` where the slip curve's ends stand for them. `bristles`:
+    stiffness σ₀, N/m, and damping σ₁, N·s/m, of LuGre's bristles (`terms.bristles`), shape `(2,)`;
+    `None` for friction that jumps at rest.
     """
 
     term: AbstractTerm
@@ -40,6 +47,8 @@ class Model(eqx.Module):
     units: tuple[tuple[str, str], ...] = eqx.field(
         static=True, default=(), converter=lambda units: tuple(sorted((SI | dict(units)).items()))
     )
+    breakaway: Float[Array, " 2"] | None = None
+    bristles: Float[Array, " 2"] | None = None
 
     @property
     def parameters(self) -> dict[str, Float[Array, ""]]:
@@ -58,7 +67,11 @@ class Model(eqx.Module):
 
     def force(self, recording: Recording) -> Float[Array, " N"]:
         """Actuator force without the acceleration terms, N, shape `(N,)`."""
-        return weighed(self.term.columns(recording), self.alpha) + self.term.offset(recording)
+        force = weighed(self.term.columns(recording), self.alpha) + self.term.offset(recording)
+        if self.bristles is None:
+            return force
+        stiffness, damping = self.bristles
+        return force + bristles.force(self.term, self.alpha, stiffness, damping, recording)
 
     def momentum(self, recording: Recording) -> Float[Array, " N"]:
         """What has to be differentiated in time to give the rest of the force, N·s, `(N,)`."""
@@ -76,11 +89,39 @@ class Model(eqx.Module):
         """The model without the terms that read a signal whose name begins with `prefix`."""
         parts = [
             (term, alpha)
-            for term, alpha in zip(summands(self.term), self._alphas(), strict=True)
+            for term, alpha in zip(summands(self.term), self.alphas(), strict=True)
             if not any(name.startswith(prefix) for name in term.coordinates)
         ]
         terms, alphas = zip(*parts, strict=True)
-        return Model(Sum(terms), jnp.concatenate(alphas), self.units)
+        return dataclasses.replace(self, term=Sum(terms), alpha=jnp.concatenate(alphas))
+
+    def with_bristles(self, stiffness: float, damping: float = 0.0) -> "Model":
+        """The model with bristles in place of the jump at rest: LuGre; Dahl without `damping`.
+
+        **Arguments:** `stiffness` σ₀, N/m; `damping` σ₁, N·s/m.
+
+        **Raises:** `ValueError` for a stiffness that is not positive or a negative damping.
+        """
+        if not 0 < stiffness < math.inf or not 0 <= damping < math.inf:
+            raise ValueError(
+                f"Bristles of stiffness {stiffness:g} and damping {damping:g} are none: the "
+                "stiffness is over zero, the damping zero or more, both finite."
+            )
+        pair = jnp.asarray([stiffness, damping], self.alpha.dtype)
+        return dataclasses.replace(self, bristles=pair)
+
+    def with_breakaway(self, backward: float, forward: float) -> "Model":
+        """The model with break-away levels, N, with their signs: NaN for the slip curve's end.
+
+        **Raises:** `ValueError` for a level of the wrong sign, which would drive the axis.
+        """
+        levels = np.array([backward, forward], float)
+        if backward > 0 or forward < 0 or np.isinf(levels).any():
+            raise ValueError(
+                f"The break-away levels are {backward:g} and {forward:g}: backwards below zero "
+                "and forwards above it, or NaN where the level is not known."
+            )
+        return dataclasses.replace(self, breakaway=jnp.asarray(levels, self.alpha.dtype))
 
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """The model with some parameters replaced; raises `ValueError` for a name it lacks."""
@@ -91,7 +132,8 @@ class Model(eqx.Module):
         wanted = [values.get(name, value) for name, value in current.items()]
         vector = jnp.stack([jnp.asarray(value, self.alpha.dtype) for value in wanted])
         count = self.alpha.shape[-1]
-        return Model(self.term.with_beta(vector[count:]), vector[:count], self.units)
+        term = self.term.with_beta(vector[count:])
+        return dataclasses.replace(self, term=term, alpha=vector[:count])
 
     def to_dict(self) -> dict[str, Any]:
         """The model as plain data for JSON: structure, parameters with units."""
@@ -101,7 +143,17 @@ class Model(eqx.Module):
             for name, value in self.parameters.items()
         }
         structure = {"term": _term_to_dict(self.term), "parameters": parameters}
-        return {"schema": SCHEMA, **structure, "units": dict(self.units)}
+        document = {"schema": SCHEMA, **structure, "units": dict(self.units)}
+        if self.breakaway is not None:
+            levels = zip(("backward", "forward"), self.breakaway, strict=True)
+            document["breakaway"] = {way: _known(level) for way, level in levels}
+        if self.bristles is not None:
+            values = zip(_BRISTLES.items(), self.bristles, strict=True)
+            document["bristles"] = {
+                name: {"value": float(value), "unit": spell(dimension, dict(self.units))}
+                for (name, dimension), value in values
+            }
+        return document
 
     @staticmethod
     def from_dict(document: Mapping[str, Any]) -> "Model":
@@ -121,7 +173,9 @@ class Model(eqx.Module):
             raise ValueError(
                 f"The model document is damaged: {shown} is missing or misplaced."
             ) from error
-        return from_parameters(term, values, _units(document.get("units", {})))
+        model = from_parameters(term, values, _units(document.get("units", {})))
+        model = _with_levels(model, document.get("breakaway"))
+        return _with_bristles(model, document.get("bristles"))
 
     def __repr__(self) -> str:
         return text.shown(self, _blocks)
@@ -129,7 +183,8 @@ class Model(eqx.Module):
     def _repr_html_(self) -> str:
         return html.shown(self, _blocks)
 
-    def _alphas(self):
+    def alphas(self) -> list[Float[Array, " q"]]:
+        """The affine parameters of each summand, in order."""
         start, parts = 0, []
         for term in summands(self.term):
             parts.append(self.alpha[start : start + len(term.affine)])
@@ -152,7 +207,7 @@ def _slip_friction(model: Model, velocity: Float[Array, "*shape"]) -> Float[Arra
     flat = jnp.ravel(velocity)
     motion = Recording(time=jnp.zeros_like(flat), force=jnp.zeros_like(flat), velocity=flat)
     total = jnp.zeros_like(flat)
-    for term, alpha in zip(summands(model.term), model._alphas(), strict=True):
+    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
         if term.coordinates <= {"velocity"}:
             total = total + weighed(term.columns(motion), alpha) + term.offset(motion)
     return jnp.reshape(total, velocity.shape)
@@ -339,6 +394,30 @@ def _number(name: str, value: Any) -> float:
         return float(value)
     shown = short(repr(value))
     raise ValueError(f"Parameter {name} of the model document must be a number, not {shown}.")
+
+
+def _with_levels(model: Model, levels: Any) -> Model:
+    """The model with the break-away levels of a document, where it has any."""
+    if levels is None:
+        return model
+    if not isinstance(levels, Mapping):
+        raise ValueError(f"The model document's breakaway is {short(repr(levels))}, no pair.")
+    pair = [_number(f"breakaway {way}", levels.get(way)) for way in ("backward", "forward")]
+    return model.with_breakaway(*pair)
+
+
+def _with_bristles(model: Model, values: Any) -> Model:
+    """The model with the bristles of a document, where it has any."""
+    if values is None:
+        return model
+    try:
+        pair = [_number(name, values[name]["value"]) for name in _BRISTLES]
+    except (KeyError, TypeError) as error:
+        raise ValueError(
+            f"The model document's bristles are {short(repr(values))}: stiffness and damping, "
+            "each with its value, belong there."
+        ) from error
+    return model.with_bristles(*pair)
 
 
 def _units(units: Any) -> dict[str, str]:

@@ -1,11 +1,12 @@
 """C99: one function for the friction, one for the whole force, the parameters as constants."""
 
 import re
+from collections.abc import Sequence
 from itertools import groupby
 
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, lines, parts, refuse
+from .parts import Line, Part, constants, levels, lines, parts, refuse
 from .syntax import C, identifier, literal
 
 _KEYWORDS = set(
@@ -30,10 +31,11 @@ def export(model: Model, name: str = "axis") -> Exported:
     text = "\n".join(
         (
             _head(model, name),
-            _constants(model),
+            _constants([*constants(model), *levels(model)]),
             C.helpers["sign_of"],
             _friction(model, name, slip),
             _force(model, name, rest),
+            *_stick(model, name),
         )
     )
     unit = dict(model.units)["force"]
@@ -58,11 +60,11 @@ def _comment(unit: str) -> str:
     return " ".join(unit.replace("*/", "* /").replace("/*", "/ *").split())
 
 
-def _constants(model: Model) -> str:
+def _constants(values: Sequence[tuple[str, float, str]]) -> str:
     rows = [
         f"static const double {identifier(name)} = {literal(value)};"
         f" /* {name}, {_comment(unit)} */\n"
-        for name, value, unit in constants(model)
+        for name, value, unit in values
     ]
     return "".join(rows)
 
@@ -93,6 +95,24 @@ double {name}_force(double position, double velocity, double acceleration, doubl
     return u;
 }}
 """
+
+
+def _stick(model: Model, name: str) -> list[str]:
+    """Eq. (4) of Kim, Kim & Ha (2004): friction at rest, up to the break-away levels."""
+    known = {key: identifier(key) for key, _, _ in levels(model)}
+    if not known:
+        return []
+    unit, tiny = _comment(dict(model.units)["force"]), "2.3e-162"
+    low = known.get("breakaway-", f"{name}_friction(-{tiny})")
+    high = known.get("breakaway+", f"{name}_friction({tiny})")
+    return [
+        f"""/* Friction at rest, {unit}: it balances the applied force up to break-away. */
+double {name}_stick(double applied)
+{{
+    return fmin(fmax(applied, {low}), {high});
+}}
+"""
+    ]
 
 
 def _body(some: list[Part]) -> str:

@@ -35,7 +35,18 @@ def export(
     """
     require(model, "export")
     found = _written(model, target, name, speed, position)
-    return found._replace(remarks=(*driven(model), *found.remarks))
+    return found._replace(remarks=(*driven(model), *_bristled(model), *found.remarks))
+
+
+def _bristled(model: Model) -> tuple[str, ...]:
+    """That the bristles of a model stay behind: a target has the slip friction that they end in."""
+    if model.bristles is None:
+        return ()
+    stiffness, damping = map(float, model.bristles)
+    return (
+        f"Not written: the bristles of presliding, stiffness {stiffness:.4g} and damping "
+        f"{damping:.3g}. The friction here jumps at rest instead.",
+    )
 
 
 def driven(model: Model) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ import re
 from .. import terms as laws
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, lines, parts, refuse
+from .parts import Line, Part, constants, levels, lines, parts, refuse
 from .syntax import MODELICA, identifier, literal
 
 _KEYWORDS = set(
@@ -36,6 +36,7 @@ def export(model: Model, name: str = "axis") -> Exported:
     text = (
         f'block {name} "Force of an axis, identified by jaxfric"\n'
         + "".join(_parameter(*row) for row in constants(model))
+        + "".join(_parameter(*row) for row in levels(model))
         + _signals(model)
         + "".join(f'  Real {_state(part)} "deflection of the bristle";\n' for part in states)
         + "".join(["initial equation\n"] * bool(states))
@@ -46,7 +47,11 @@ def export(model: Model, name: str = "axis") -> Exported:
         + f"  force = noEvent(friction + {_sum(_products(rest) + _bristles(states))});\n"
         + f"end {name};\n"
     )
-    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]))
+    remarks = (
+        "The break-away levels are parameters for a model of sticking: the force that a motion "
+        "needs does not depend on them.",
+    ) * bool(levels(model))
+    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]), (), remarks)
 
 
 def _unit(unit: str) -> str:

@@ -174,6 +174,18 @@ def constants(model: Model) -> list[tuple[str, float, str]]:
     ]
 
 
+def levels(model: Model) -> list[tuple[str, float, str]]:
+    """Name, value and unit of the model's break-away levels; none where it has none."""
+    if model.breakaway is None:
+        return []
+    unit, pair = dict(model.units)["force"], np.asarray(model.breakaway, float)
+    return [
+        (f"breakaway{sign}", float(value), unit)
+        for sign, value in zip("-+", pair, strict=True)
+        if np.isfinite(value)
+    ]
+
+
 def refuse(wrong: Sequence[Part], target: str, able: Sequence[str], simpler: str = "") -> None:
     """Raise `ValueError` that names the parts and who can take them; nothing for no part."""
     if not wrong:

@@ -10,7 +10,7 @@ from ..units import is_rotary
 from . import cost
 from .cost import Range
 from .outcome import ForceError
-from .parts import SAMPLED, Part, parts
+from .parts import SAMPLED, Part, levels, parts
 
 
 class Joint(NamedTuple):
@@ -70,10 +70,18 @@ def joint(
         rest,
         is_rotary(dict(model.units)),
         cost.error(where, wanted, given, unit, bursts),
-        tuple(_told(model, part, counted, where, unit) for part in missing),
+        (*(_told(model, part, counted, where, unit) for part in missing), *_stick(model)),
         (*_units(model), *_shifted(model, constant, rest)),
         known["velocity"],
     )
+
+
+def _stick(model: Model) -> list[str]:
+    """That a joint's dry friction is one level, at rest and in slip."""
+    return [
+        f"{name}: {value:.4g} {unit}; the joint sticks at the level at which it slips"
+        for name, value, unit in levels(model)
+    ]
 
 
 def _shifted(model: Model, constant: float, rest: float) -> tuple[str, ...]:

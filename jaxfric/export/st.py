@@ -9,7 +9,7 @@ from itertools import groupby
 
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, lines, parts, refuse
+from .parts import Line, Part, constants, levels, lines, parts, refuse
 from .syntax import Syntax, identifier, literal
 
 _KEYWORDS = set(
@@ -60,7 +60,10 @@ def export(model: Model, name: str = "axis") -> Exported:
         "At commanded standstill the friction is zero; from the first commanded velocity on it is "
         "the break-away force in that direction. Feed it the commanded motion, not the measured."
     )
-    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]), (), (remark,))
+    unit = dict(model.units)["force"]
+    held = [f"{name} {value:.4g} {unit}" for name, value, unit in levels(model)]
+    remarks = (remark, *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held))
+    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), (), remarks)
 
 
 def _fine(name: str) -> bool:

@@ -14,7 +14,7 @@ from ..units import VELOCITY, spell
 from . import cost
 from .cost import Range
 from .outcome import Exported, ForceError
-from .parts import Part, parts, refuse
+from .parts import Part, levels, parts, refuse
 
 # A Gaussian bump at a fifth of the top speed (the default range) is drawn to 1e-3 of its height.
 POINTS = 201
@@ -42,6 +42,7 @@ def export(
     refuse([p for p in further if _coordinate(p) is None], "table", ["c and modelica"])
     known = cost.ranges(model, speed, position)
     columns, force_error = _friction(model, known["velocity"], points)
+    columns |= _stick(model, points)
     for part in further:
         columns |= _beside(model, part, known, points)
     remark = [] if len(every) == len(parts(model)) else ["Inertia is no table: see the model."]
@@ -49,6 +50,16 @@ def export(
     if odd:
         remark.append(f"{', '.join(odd)}: for positive velocity; negative velocity turns the sign.")
     return Exported(_csv(columns), force_error, (), tuple(remark), known["velocity"])
+
+
+def _stick(model: Model, points: int) -> dict[str, np.ndarray]:
+    """The break-away level of each row's direction; the slip curve's end where it is not known."""
+    if not levels(model):
+        return {}
+    tiny = np.sqrt(np.finfo(float).tiny)  # below any Stribeck velocity, in any unit
+    ends = np.asarray(model.friction(jnp.asarray([-tiny, tiny])), float)
+    pair = np.where(np.isfinite(model.breakaway), np.asarray(model.breakaway, float), ends)
+    return {f"breakaway [{dict(model.units)['force']}]": np.repeat(pair, points)}
 
 
 def _odd(part: Part) -> bool:

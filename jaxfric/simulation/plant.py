@@ -17,7 +17,8 @@ class Plant(eqx.Module):
     """M(x) dv/dt = u − F(x, v), read off a model's columns and momentum.
 
     **Arguments:** `model`; `smooth`, the velocity of the smooth approximation of stick-slip, m/s,
-    or `None` for the exact law.
+    or `None` for the exact law. The break-away levels of the model, where it has them, stand for
+    F_slip(0±) at rest, if they are no lower: an axis that broke away at less would stop at once.
     """
 
     model: Model
@@ -55,6 +56,10 @@ class Plant(eqx.Module):
         stiffness, damping = jax.grad(force, argnums=(0, 1))(position, velocity)
         return self.inertia(position, velocity, rest)[0], (damping, stiffness)
 
+    def start(self, position: Scalar, velocity: Scalar) -> tuple[Scalar, ...]:
+        """The state that begins with a position and a velocity."""
+        return position, velocity
+
     def step(self, state: tuple[Scalar, Scalar], force: Scalar, span: Scalar, rest: "Surroundings"):
         """Position and velocity after `span` seconds under a constant force.
 
@@ -86,10 +91,21 @@ class Plant(eqx.Module):
         moving, forward, backward = self.resistance(x, jnp.stack([v, least, -least]), rest)
         mass, drift = self.inertia(x, v, rest)
         free = force - drift
-        breaks = jnp.where(free > forward, 1.0, jnp.where(free < backward, -1.0, 0.0))
+        below, above = self._beyond_slip(v.dtype)
+        up, down = free > forward + above, free < backward + below
+        breaks = jnp.where(up, 1.0, jnp.where(down, -1.0, 0.0))
         side = jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
         resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, free))
         return side, (free - jnp.where(v == 0, resting, moving)) / mass
+
+    def _beyond_slip(self, dtype):
+        """By how much the break-away levels lie beyond the slip curve's ends, N; backwards < 0."""
+        if self.model.breakaway is None:
+            return jnp.zeros(2, dtype)
+        least = slowest(dtype)
+        ends = self.model.friction(jnp.stack([-least, least]))
+        beyond = jnp.nan_to_num(self.model.breakaway.astype(dtype) - ends)
+        return jnp.minimum(beyond[0], 0.0), jnp.maximum(beyond[1], 0.0)
 
     def _beside(self, side, v):
         """The velocity, kept on its side of zero: a law for one direction ends at zero."""

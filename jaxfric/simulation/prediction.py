@@ -125,9 +125,10 @@ def in_motion(recording: Recording, delay: float = 0.0) -> Bool[np.ndarray, " N"
     prepared = signals.prepare(uniform(recording))
     speed = np.abs(np.asarray(prepared.velocity))[: recording.num_samples]
     moving = speed > float(_scales(prepared).slowest)
+    moving &= np.asarray(recording.mask)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
-    return np.asarray(recording.mask) & moving & ~outliers(recording)
+    return moving & ~outliers(recording)
 
 
 def unseen(names: Sequence[str], recording: Recording) -> list[str]:

@@ -14,6 +14,7 @@ from .. import signals
 from ..data.recording import Recording, described, require
 from ..models import Model, require as require_model
 from .control import AbstractController, Encoder, Feedback
+from .memory import Bristled, holds, lost
 from .plant import Plant, Surroundings, slowest
 
 # Between two samples the actuator force is constant, so the acceleration changes only as fast as
@@ -44,8 +45,7 @@ class _Held(NamedTuple):
 
 
 class _State(NamedTuple):
-    position: Array
-    velocity: Array
+    motion: tuple[Array, ...]
     measured: Array
     elapsed: Array
     memory: Any
@@ -73,7 +73,8 @@ def simulate(
     **Arguments:**
 
     - `model`: any [`Model`][jaxfric.models.Model] with inertia, whose terms are functions of one
-      sample; units are those of the recording.
+      sample, or bristles (`Dahl`, `LuGre`, `Model.with_bristles`), whose deflection is a state;
+      units are those of the recording.
     - `reference`: a recording, signals of shape `(N,)`. With a `controller`, the set-point is its
       channel `reference`, else its position; the set-point's velocity is the channel
       `reference_velocity`, else the velocity that belongs to the position, else differences.
@@ -99,10 +100,11 @@ def simulate(
     `position`, m, and `velocity`, m/s, at the sample (no velocity if there is an encoder); all
     channels, and `reference` in closed loop.
 
-    **Raises:** `ValueError` for fewer than two samples, without a set-point or an inertia, or for
-    noise without a key.
+    **Raises:** `ValueError` for fewer than two samples, without a set-point or an inertia, for
+    noise without a key, or for a term with a memory of another kind.
     """
     _check(model, reference, controller, encoder, force_noise, key)
+    _check_memory(model, smooth)
     if substeps is None:
         substeps = default_substeps(model, reference, smooth)
     force_key, encoder_key = (None, None) if key is None else jax.random.split(key)
@@ -154,6 +156,16 @@ def _check(model, reference, controller, encoder, force_noise, key):
     noisy = _positive(force_noise) or (encoder is not None and _positive(encoder.noise))
     if noisy and key is None:
         raise ValueError("simulate with noise needs a key=jax.random.key(seed) to draw it from.")
+
+
+def _check_memory(model, smooth):
+    if unheld := lost(model):
+        raise ValueError(
+            f"simulate holds the memory of bristles (Dahl, LuGre) only, not that of "
+            f"{', '.join(unheld)}. Simulate the model without that term."
+        )
+    if smooth is not None and holds(model):
+        raise ValueError("smooth= blends friction that jumps at rest; bristles have no jump.")
 
 
 def _positive(value) -> bool:
@@ -232,16 +244,17 @@ def _set_point(reference, controller, together):
 @eqx.filter_jit
 def _integrate(model, controller, encoder, held, substeps, smooth):
     """Force, position and velocity at every sample, each `(N,)`: one scan, compiled once."""
-    plant = Plant(model, smooth)
+    plant = _plant(model, smooth)
 
     def advance(state, now):
-        fresh = _fresh(controller, encoder, now)
+        fresh = _fresh(plant, controller, encoder, now)
         state = jax.tree.map(lambda new, old: jnp.where(now.restart, new, old), fresh, state)
-        measured = state.position if encoder is None else encoder.read(state.position, now.noise)
+        position, velocity = state.motion[:2]
+        measured = position if encoder is None else encoder.read(position, now.noise)
         force, memory = now.force, state.memory
         if controller is not None:
-            velocity = _seen_velocity(state, measured, encoder, now)
-            seen = (now.interval, now.reference, now.reference_velocity, measured, velocity)
+            seen_velocity = _seen_velocity(state, measured, encoder, now)
+            seen = (now.interval, now.reference, now.reference_velocity, measured, seen_velocity)
             force, memory = controller(memory, Feedback(*seen))
         span, rest = now.interval / substeps, Surroundings(now.time, now.channels)
 
@@ -249,26 +262,31 @@ def _integrate(model, controller, encoder, held, substeps, smooth):
             clock = rest.at(now.time + span * i.astype(span.dtype))
             return plant.step(motion, force, span, clock)
 
-        motion = jax.lax.fori_loop(0, substeps, substep, state[:2], unroll=min(substeps, 2))
-        following = _State(*motion, measured, now.interval, memory)
-        return following, (force, measured, state.velocity)
+        motion = jax.lax.fori_loop(0, substeps, substep, state.motion, unroll=min(substeps, 2))
+        following = _State(motion, measured, now.interval, memory)
+        return following, (force, measured, velocity)
 
-    first = _fresh(controller, encoder, jax.tree.map(lambda x: x[0], held))
+    first = _fresh(plant, controller, encoder, jax.tree.map(lambda x: x[0], held))
     return jax.lax.scan(advance, first, held)[1]
 
 
-def _fresh(controller, encoder, now):
+def _plant(model, smooth):
+    """The plant of a model: with a state for its bristles where it has any."""
+    return Bristled(model) if holds(model) else Plant(model, smooth)
+
+
+def _fresh(plant, controller, encoder, now):
     """The state at the start of a segment."""
     x, v = now.initial_position, now.initial_velocity
     measured = x if encoder is None else encoder.read(x, now.noise)
     memory = () if controller is None else controller.start()
-    return _State(x, v, measured, jnp.zeros_like(x), memory)
+    return _State(plant.start(x, v), measured, jnp.zeros_like(x), memory)
 
 
 def _seen_velocity(state, measured, encoder, now):
     """The true velocity, or with an encoder the backward difference of its counts."""
     if encoder is None:
-        return state.velocity
+        return state.motion[1]
     elapsed = state.elapsed
     known = elapsed > 0
     difference = (measured - state.measured) / jnp.where(known, elapsed, 1.0)
@@ -299,7 +317,9 @@ def default_substeps(
 def _rates(model, reference, smooth):
     """Inertia, ∂F/∂v and ∂F/∂x at states of the reference, each `(256, 2 speeds + 1)`."""
     dtype = reference.time.dtype
-    plant = Plant(*_cast((model, None if smooth is None else jnp.asarray(smooth)), dtype))
+    model, smooth = _cast((model, None if smooth is None else jnp.asarray(smooth)), dtype)
+    bristled = Bristled(model) if holds(model) else None
+    plant = Plant(model, smooth) if bristled is None else bristled.still
     together = reference.segment[1:] == reference.segment[:-1]
     goal, velocity = _set_point(reference, True, together)
     speeds = jnp.nanmax(jnp.abs(velocity)) * jnp.asarray(_SPEEDS, dtype)
@@ -310,4 +330,7 @@ def _rates(model, reference, smooth):
     channels = {name: channel[chosen] for name, channel in reference.channels.items()}
     each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
     surroundings = Surroundings(reference.time[chosen], channels)
-    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)
+    mass, slopes = jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)
+    if bristled is not None:
+        slopes = (slopes[0], jnp.abs(slopes[1]) + bristled.stiffness())
+    return mass, slopes

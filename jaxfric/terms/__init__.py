@@ -64,7 +64,9 @@ from .time import (
     AbstractModulated as AbstractModulated,
     DisturbancePulses as DisturbancePulses,
     FrictionStep as FrictionStep,
+    GainStep as GainStep,
     LoadDrift as LoadDrift,
+    PayloadChange as PayloadChange,
     PeriodicDisturbance as PeriodicDisturbance,
     ThermalDrift as ThermalDrift,
 )

@@ -1,7 +1,7 @@
 """Friction with a memory: presliding, and friction that lags behind velocity.
 
-A term with a memory is a function of the whole recording, not of a sample, so it cannot stand in
-`simulate`, which asks terms about single states.
+A term with a memory is a function of the whole recording, not of a sample. `simulate` holds the
+memory of bristles (Dahl, LuGre), a state that follows the motion; the others cannot stand in it.
 """
 
 import dataclasses
@@ -106,7 +106,21 @@ def _distance_bounds(scales):
 _DISTANCE = Parameter("presliding_distance", POSITION, _distance_bounds)
 
 
-class Dahl(AbstractMemory):
+class AbstractBristle(AbstractMemory):
+    """A term whose columns are functions of the velocity and of Dahl's deflection z."""
+
+    presliding_distance: eqx.AbstractVar[Float[Array, ""] | float]
+
+    @abstractmethod
+    def lagging(self, velocity: Float[Array, " N"], deflection: Float[Array, " N"]):
+        """The columns at some velocities, m/s, and deflections, −1 to 1, `(N, p)`."""
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        deflection = bristle(recording, self.presliding_distance)
+        return self.lagging(recording.velocity, deflection)
+
+
+class Dahl(AbstractBristle):
     """Presliding that Coulomb friction lacks: F = F_p (z − sign v), dz = (dx/x_d)(1 − z sign(dx)).
 
     `presliding_distance` x_d, m; F_p, equal to the Coulomb level for Dahl's model, is affine, and
@@ -117,9 +131,8 @@ class Dahl(AbstractMemory):
     affine: ClassVar = (Parameter("presliding_force", FORCE),)
     nonlinear: ClassVar = (_DISTANCE,)
 
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        lagging = bristle(recording, self.presliding_distance) - jnp.sign(recording.velocity)
-        return lagging[:, None]
+    def lagging(self, velocity, deflection) -> Float[Array, "N 1"]:
+        return (deflection - jnp.sign(velocity))[:, None]
 
 
 def _stribeck_bounds(scales):
@@ -127,7 +140,7 @@ def _stribeck_bounds(scales):
     return scales.slowest, 0.5 * scales.fastest
 
 
-class LuGre(AbstractMemory):
+class LuGre(AbstractBristle):
     """Presliding with a Stribeck curve: F = (F_p + F_b exp(−(v/v_s)²)) (z − sign v), z as in Dahl.
 
     The LuGre model (Canudas de Wit, Olsson, Åström & Lischinsky 1995) for a bristle whose
@@ -143,9 +156,9 @@ class LuGre(AbstractMemory):
     )
     nonlinear: ClassVar = (_DISTANCE, Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds))
 
-    def columns(self, recording: Recording) -> Float[Array, "N 2"]:
-        lagging = bristle(recording, self.presliding_distance) - jnp.sign(recording.velocity)
-        bump = jnp.exp(-((recording.velocity / self.stribeck_velocity) ** 2))
+    def lagging(self, velocity, deflection) -> Float[Array, "N 2"]:
+        lagging = deflection - jnp.sign(velocity)
+        bump = jnp.exp(-((velocity / self.stribeck_velocity) ** 2))
         return jnp.stack([lagging, bump * lagging], axis=1)
 
 
