@@ -50,8 +50,13 @@ def expected_noise(machine):
     return float(np.hypot(machine.noise.force, machine.noise.process))
 
 
-def test_every_effect_of_the_catalogue_can_be_concealed_but_a_wrong_parameter():
-    assert set(concealed.NAMES) == {e.name for e in CATALOGUE} - {"parameter_mismatch"}
+# A wrong parameter belongs to a model, not to a machine; machines whose mass or gain changes while
+# they run are not drawn yet: tests/test_moments.py plants those.
+NOT_DRAWN = {"parameter_mismatch", "payload_change", "gain_step"}
+
+
+def test_every_effect_of_the_catalogue_can_be_concealed_but_those_that_are_named():
+    assert set(concealed.NAMES) == {e.name for e in CATALOGUE} - NOT_DRAWN
     assert not set(concealed.OUTSIDE) & {e.name for e in CATALOGUE}
 
 

@@ -59,6 +59,9 @@ CASES = {
     "thermal_coulomb": (T.ThermalDrift(T.Coulomb(), 3.0, start=-1.0), (2.0,)),
     "thermal_stribeck": (T.ThermalDrift(T.Gaussian(0.05), 3.0), (5.0,)),
     "friction_step": (T.FrictionStep(T.Coulomb(), 6.3), (1.5,)),
+    "payload": (T.PayloadChange(step_time=3.1), (1.5, 2.0)),
+    "payload_ramp": (T.PayloadChange(step_time=3.1, ramp=0.2), (1.5, 2.0)),
+    "gain_step": (T.GainStep(6.3, 0.2), (0.2,)),
     "friction_ramp": (T.FrictionStep(T.Viscous(), 6.3, 0.2), (10.0,)),
     "load_drift": (T.LoadDrift(0.0, 12.0, 3), (1.5, -1.0, 0.7)),
     "tone": (T.PeriodicDisturbance(3.7), (0.7, 0.9)),
@@ -561,6 +564,9 @@ SEARCHED = {
     "cogging": {"pitch": (0.008, 0.02)},
     "sticky_spot": {},
     "dahl": {},
+    "payload": {},
+    "payload_ramp": {},
+    "gain_step": {},
     "friction_ramp": {},
     "tone": {"frequency": (3.0, 4.5)},
 }
@@ -590,8 +596,8 @@ def test_the_catalogue_holds_together():
         "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance transport_delay actuator_lag actuator_deadband actuator_saturation "
-        "gain_asymmetry thermal_drift friction_step load_drift periodic_disturbance "
-        "disturbance_pulses cross_axis"
+        "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
+        "periodic_disturbance disturbance_pulses cross_axis"
     )
     assert list(effects.EFFECTS) == reference_names.split()
     for effect in catalogue.CATALOGUE:

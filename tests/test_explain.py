@@ -917,13 +917,10 @@ def test_a_step_is_dated_between_two_rows(healthy):
 
 
 def test_terms_that_share_what_they_remove_stand_in_for_another():
-    def found(*shares):
-        return [types.SimpleNamespace(share=share) for share in shares]
-
-    assert telling._stand_ins(found(0.2, 0.2, 0.1), 0.7)
-    assert not telling._stand_ins(found(0.4, 0.2, 0.05), 0.7)
+    assert telling._stand_ins([0.2, 0.2, 0.1], 0.7)
+    assert not telling._stand_ins([0.4, 0.2, 0.05], 0.7)
     # Two effects may overlap: a strong excitation of one is seldom orthogonal to the other.
-    assert not telling._stand_ins(found(0.3, 0.1), 0.9)
+    assert not telling._stand_ins([0.3, 0.1], 0.9)
 
 
 def both_ways(values, errors, names=("force",) * 2, joined=parameters.with_elsewhere):
@@ -1029,3 +1026,22 @@ def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch
     effects = EFFECTS["spring"], [EFFECTS["cogging"]]
     for part, least in ((naming.MOST, 1.5), (naming.MOST_JUDGED, 1.0)):
         assert naming.least_gain(*effects, 1000.0, 3.0, part) == pytest.approx(least)
+
+
+def test_two_stops_for_one_that_stiffens_add_up_and_are_two_terms(healthy):
+    """A Hertzian contact, F ∝ depth^1.5, which no single stop of the library is."""
+    high = float(np.quantile(np.asarray(healthy[0].position), 0.75))
+    deepest = float(np.max(np.asarray(healthy[0].position))) - high
+    runs = []
+    for run in healthy:
+        depth = np.maximum(np.asarray(run.position) - high, 0.0) / deepest
+        runs.append(dataclasses.replace(run, force=run.force + 10 * COULOMB * depth**1.5))
+    told = explain(runs[0], "gaussian", runs[1])
+    stops = [finding for finding in told.findings if finding.effect == "end_stop"]
+    assert len(stops) > 1, told
+    assert sum(finding.share for finding in stops) > 0.9
+    # Looked up by the term, the second would hand its values to the first.
+    assert told.fit["holdout_adjusted"]["rephased"] == []
+    places = [finding.parameters["stop_position"] for finding in stops]
+    assert len({float(place.standard_error) for place in places}) == len(places)
+    assert all(high - 0.01 < float(place.value) < high + deepest for place in places)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import jaxfric as jf
+from jaxfric.simulation.prediction import in_motion
 from jaxfric.simulators.columns import GAIN, distinct
 from jaxfric.simulators.inverse import Motion, along
 
@@ -90,3 +92,36 @@ def test_what_no_motion_tells_apart_is_one_column():
     model = mujoco.MjModel.from_xml_string(single)
     assert "body/upper/mass" not in distinct(mujoco, model, 1, "elbow").attributes
     assert distinct(mujoco, model, 1, "elbow").attributes[GAIN].owner == "actuator drive"
+
+
+def stopping(count=16000, step=5e-4):
+    """A joint that stops under dry friction: its recording, with the force that acted."""
+    text = """<mujoco><option timestep="5e-4" integrator="implicitfast"/><worldbody><body>
+     <joint name="hinge" axis="0 1 0" damping="0.2" frictionloss="3" armature="0.05"/>
+     <geom type="capsule" fromto="0 0 0 .4 0 0" size=".02" mass="5"/></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    data, position, force = mujoco.MjData(model), [], []
+    data.qvel[0] = 2.0
+    for time in step * np.arange(count):
+        goal, speed = np.sin(2 * time), 2 * np.cos(2 * time)
+        late = 60 * (goal - data.qpos) + 8 * (speed - data.qvel) + data.qfrc_bias
+        data.qfrc_applied[:] = late
+        position.append(data.qpos[0])
+        force.append(late[0])
+        mujoco.mj_step(model, data)
+    counted = 5e-5 * np.round(np.array(position) / 5e-5)
+    units = {"force": "N·m", "position": "rad"}
+    return text, jf.Recording(step * np.arange(count), np.array(force), counted, units=units)
+
+
+def test_where_its_friction_creeps_to_rest_nothing_is_compared():
+    text, recording = stopping()
+    simulator = jf.simulators.mujoco(text)
+    force, known = np.asarray(recording.force), np.asarray(simulator(recording))
+    seen = simulator.beside(recording)
+    moving = in_motion(seen)
+    assert moving.mean() > 0.9
+    wrong = np.linalg.norm((force - known)[in_motion(recording)])
+    left = np.linalg.norm((force - known)[moving])
+    assert left < 0.015 * np.linalg.norm(force[moving])
+    assert left < 0.7 * wrong

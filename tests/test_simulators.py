@@ -50,6 +50,7 @@ def test_a_torque_constant_is_a_gain_and_nothing_else(healthy):
     (finding,) = found.findings
     assert set(finding.parameters) == {"gain"}
     assert float(finding.parameters["gain"].value) == pytest.approx(0.15, rel=0.02)
+    assert "(the torque constant) is 1.1" in finding.sentence
 
 
 def test_missing_physics_beside_a_wrong_value(healthy):

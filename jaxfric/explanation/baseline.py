@@ -173,7 +173,7 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
         free = [i for i in free if i not in vague] or free
         instead = _instead(own, given.residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
-    return Mismatch(moved, float(share), p_value, given.energy, instead)
+    return Mismatch(moved, float(share), p_value, given.energy, instead=instead)
 
 
 # What half of all parameters would do as well says nothing of any of them.

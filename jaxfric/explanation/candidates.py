@@ -9,7 +9,8 @@ import numpy as np
 
 from .. import terms as laws
 from ..data.recording import Recording
-from ..terms.base import AbstractTerm, Directional, summands
+from ..simulators.known import TURNS
+from ..terms.base import AbstractTerm, Directional, Sum, summands
 from ..terms.catalogue import CATALOGUE, Effect
 from ..terms.effects import EFFECTS
 from ..terms.friction import AbstractBump
@@ -22,9 +23,19 @@ from .tones import tones_to_try
 
 # Points of a grid over one nonlinear parameter, where nothing finer is needed below.
 GRID = 24
+# Terms of one moment, which is told to within a ramp only.
+STEPS = (laws.FrictionStep, laws.PayloadChange, laws.GainStep)
 # Effects that time alone drives: another recording need not show them.
-OF_THE_MOMENT = frozenset(
-    {"friction_step", "load_drift", "disturbance_pulses", "thermal_drift", "periodic_disturbance"}
+OF_THE_MOMENT = frozenset(  # fmt: skip
+    {
+        "friction_step",
+        "load_drift",
+        "disturbance_pulses",
+        "thermal_drift",
+        "periodic_disturbance",
+        "payload_change",
+        "gain_step",
+    }
 )
 
 
@@ -119,6 +130,10 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
                 continue
             if isinstance(term, laws.FrictionalLag):
                 term = dataclasses.replace(term, bump=_bump(base))
+            turn = TURNS.get(dict(evidence.motion.units).get("position", ""))
+            if isinstance(term, laws.PayloadChange) and turn and "position" in have:
+                load = Sum((laws.Inertia(), laws.Gravity(turn)))
+                term = dataclasses.replace(term, load=load)
             found += list(_with_places(effect, term, evidence))
     present = {type(t) for t in leaves(base)}
     return [c for c in found if not (set(map(type, leaves(c.term))) <= present)]
@@ -187,8 +202,7 @@ def _grid(term: AbstractTerm, evidence: Evidence) -> np.ndarray:
     count = len(term.nonlinear)
     if not count:
         return np.zeros((1, 0))
-    # A step is told to within its ramp only.
-    fine = 8 * GRID if isinstance(term, laws.FrictionStep) else GRID
+    fine = 8 * GRID if isinstance(term, STEPS) else GRID
     along = (np.arange(fine) + 0.5) / fine
     return space.beta(np.repeat(along[:, None], count, axis=1))
 

@@ -1,5 +1,6 @@
 """Which physics the residual calls for: the winner of a contest joins, and all are refitted."""
 
+import copy
 from collections.abc import Hashable, Sequence
 from typing import NamedTuple
 
@@ -124,12 +125,19 @@ def search(
             return Named(base, now, taken, round_, start=start)
         visited.add(names)
         best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
-        taken.append(Taken(best.trial, rivals, best.p_value))
-        terms = (*now.terms, best.trial.candidate.term)
+        trial = _own(best.trial)
+        taken.append(Taken(trial, rivals, best.p_value))
+        terms = (*now.terms, trial.candidate.term)
         now = fit(terms, evidence, best.betas)
         evidence = with_predictions(evidence, now)
         now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
+
+
+def _own(trial: Trial) -> Trial:
+    """The trial with a term of its own: two waves of one candidate are two terms."""
+    term = copy.copy(trial.candidate.term)
+    return trial._replace(candidate=trial.candidate._replace(term=term))
 
 
 # Of the idealisations of a reversal none is right to the last tenth of its score, and a law of

@@ -46,6 +46,9 @@ _TEXTS = {
     "thermal_drift": "Friction changes exponentially over the record, time constant "
     "{time_constant}: warming",
     "friction_step": "At t = {step_time} Coulomb friction changes by {step_coulomb}",
+    "payload_change": "At t = {step_time} the load changes: its inertia by {payload_inertia}",
+    "gain_step": "At t = {step_time} the force needed for the same motion changes by {step_gain} "
+    "of it: a gain, a torque constant or a transmission that switched",
     "load_drift": "A constant force wanders slowly over the record",
     "periodic_disturbance": "A force periodic in time, {frequency}, amplitude {amplitude}",
     "disturbance_pulses": "Isolated pushes at single times",
@@ -68,6 +71,9 @@ def sentence(
     # The stop at the lower end is told as the one at the upper end.
     words = {n.removeprefix("lower_"): _words(n, estimate) for n, estimate in parameters.items()}
     template = _slow(effect, parameters, stroke) or _TEXTS.get(effect, effect.replace("_", " "))
+    weight = next((n for n in ("amplitude", "payload_offset") if n in words), None)
+    if effect == "payload_change" and weight:
+        template += f", and its weight by {{{weight}}}: something was picked up or put down"
     text = template.format_map(_Gaps(words))
     text += f"; {share:.0%} of the unexplained force"
     if rivals:
@@ -137,13 +143,30 @@ def mismatch_sentence(moved, share: float) -> str:
     """Wrong values of the baseline as a sentence."""
     parts = []
     for name, m in moved.items():
-        if m.before:
+        if name == GAIN and not m.before:
+            parts.append(_times(1 + float(m.value), float(m.standard_error)))
+        elif m.before:
             value = quantity(Estimate(m.value, m.standard_error, m.unit))
             parts.append(f"{_spoken(name)} is {value}, not {m.before:.4g}")
         else:
             value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
     return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
+
+
+# How much of a simulator's force is recorded beyond all of it.
+GAIN = "gain"
+
+
+def _times(factor: float, error: float) -> str:
+    """The recorded force as a multiple of the simulator's; of another sign where it is negative."""
+    size = quantity(Estimate(abs(factor), error, ""))
+    if factor < 0:
+        return (
+            f"the recorded force has the opposite sign, and {size} times the size of the "
+            "simulator's: turn one of them round (--scale force=-1)"
+        )
+    return f"the recorded force (the torque constant) is {size} times the simulator's"
 
 
 _SPOKEN = {

@@ -50,9 +50,9 @@ def tell(
     units, evidence = recording.unit_names, asked.evidence
     first, found, rest = better.first, better.found, better.rest
     before, after = _places(asked, better, wrong, seed)
-    findings = _findings(found, asked, rest, first)
+    findings, alone = _findings(found, asked, rest, first)
     shown = partial_residuals(asked, better)
-    standing = _stand_ins(findings, 1 - found.last.energy / first.energy)
+    standing = _stand_ins(alone, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
@@ -270,10 +270,13 @@ STAND_INS = 3
 CLAIMED = 0.75
 
 
-def _stand_ins(findings: list[Finding], removed: float) -> bool:
-    """Whether many findings share what they remove of the mismatch, instead of adding up to it."""
-    claimed = sum(max(finding.share, 0.0) for finding in findings)
-    return len(findings) >= STAND_INS and claimed < CLAIMED * removed
+def _stand_ins(alone: list[float], removed: float) -> bool:
+    """Whether many findings share what they remove of the mismatch, instead of adding up to it.
+
+    `alone`: what each removes beside all the others.
+    """
+    claimed = sum(max(share, 0.0) for share in alone)
+    return len(alone) >= STAND_INS and claimed < CLAIMED * removed
 
 
 def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool) -> str:
@@ -290,15 +293,19 @@ NO_POSITION = (
 )
 
 
-def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
+def _findings(found: Named, asked: Question, rest, first: Fit) -> tuple[list[Finding], list[float]]:
+    """The findings, and the share of each beside all the others."""
     start = len(found.last.terms) - len(found.taken)
     values = estimated(found, asked, rest)[start:]
-    findings = []
+    findings, alone = [], []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
         if "step_time" in parameters:
             parameters = _dated(parameters, asked.evidence)
         share, held = _shares(found, asked, rest, first, number)
+        alone.append(share)
+        if twins := _twins(found, number):
+            share, held = _shares(found, asked, _without(rest, twins), first, number)
         rivals = taken.rivals
         told = parameters | _reach(parameters, asked.evidence)
         text = sentence(effect.name, told, share, rivals, _stroke(asked.evidence))
@@ -322,7 +329,27 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> list[Finding]:
                 taken.p_value,
             )
         )
-    return findings
+    return findings, alone
+
+
+def _twins(found: Named, number: int) -> list[int]:
+    """Later findings of the same effect, the last one first.
+
+    Two stops that stand for one which stiffens are each nearly all of it without the other. So the
+    earlier one is judged before the later, and their shares add up to that of the effect.
+    """
+    names = [taken.trial.candidate.effect.name for taken in found.taken]
+    return [n for n in reversed(range(number + 1, len(names))) if names[n] == names[number]]
+
+
+def _without(rest: tuple[Question, Named], numbers: list[int]) -> tuple[Question, Named]:
+    """What is judged, without some findings, of which the last comes first."""
+    where, left = rest
+    evidence = with_predictions(where.evidence, left.last)
+    for number in numbers:
+        less = verification.lacking(left, evidence, number)
+        left = left._replace(last=less, taken=left.taken[:number] + left.taken[number + 1 :])
+    return where, left
 
 
 def _stroke(evidence: Evidence) -> float:

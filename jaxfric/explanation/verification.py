@@ -13,7 +13,7 @@ from .regression import Fit, fast, without
 # What belongs to a moment of one recording says nothing about another.
 _MOMENTARY = (
     laws.FrictionStep, laws.LoadDrift, laws.ThermalDrift, laws.DisturbancePulses,
-    laws.PeriodicDisturbance,
+    laws.PeriodicDisturbance, laws.PayloadChange, laws.GainStep,
 )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from .. import signals
 from ..data.recording import Recording
@@ -17,6 +17,9 @@ from ..terms.base import Sum
 from . import columns, inverse
 from .known import AbstractSimulator, Attribute, along
 from .loading import joints_of, library, read
+
+# Of a limit that is reached, what rounding and the solver leave.
+ROUNDING = 1e-6
 
 
 class Mujoco(AbstractSimulator):
@@ -82,7 +85,8 @@ class Mujoco(AbstractSimulator):
         found = {KNOWN_REST: seen.rest[:, own], KNOWN_MOMENTUM: seen.momentum[:, own]}
         for number, parts in enumerate(self.columns.along(seen)):
             found |= dict(zip(channels_of(number), parts, strict=True))
-        known = along(recording, seen.force[:, own], held_out)
+        force = np.where(self._sticks(seen), np.nan, seen.force[:, own])
+        known = along(recording, force, held_out)
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
         return dataclasses.replace(known, channels=known.channels | sound)
 
@@ -99,6 +103,16 @@ class Mujoco(AbstractSimulator):
             motion = inverse.Motion(*np.moveaxis(parts, 0, -1))
             self._shared[key] = inverse.along(self.mujoco, self.model, motion)
         return self._shared[key]
+
+    def _sticks(self, seen: inverse.Along) -> Bool[np.ndarray, " N"]:
+        """Where the model's dry friction is below its limit: it creeps to rest there, `(N,)`.
+
+        MuJoCo's friction is a stiff function of the acceleration then (Todorov 2014, soft
+        constraints), ten times that of the inertia by default: of a recorded motion, whose
+        acceleration has to be derived, it may be anything up to break-away, as at rest.
+        """
+        limit = float(self.model.dof_frictionloss[self.number])
+        return np.abs(seen.friction[:, self.number]) < (1 - ROUNDING) * limit
 
     def _position(self, recording: Recording, joint: str) -> Recording:
         """The recording with the position of a joint as its own, and nothing derived from it."""

@@ -67,6 +67,14 @@ def _step_shapes(scales):
     return (laws.FrictionStep(laws.Coulomb(), ramp=RAMP_SHARE * float(scales.duration)),)
 
 
+def _payload_shapes(scales):
+    return (laws.PayloadChange(ramp=RAMP_SHARE * float(scales.duration)),)
+
+
+def _gain_step_shapes(scales):
+    return (laws.GainStep(ramp=RAMP_SHARE * float(scales.duration)),)
+
+
 def _drift_shapes(scales):
     start, duration = float(scales.start), float(scales.duration)
     return tuple(laws.LoadDrift(start, duration, degree) for degree in (1, 3))
@@ -310,6 +318,23 @@ CATALOGUE = (
         ("thermal_drift",),
         _step_shapes,
         separate_by="Repeat from cold: warming repeats, a step does not.",
+    ),
+    Effect(
+        "payload_change",
+        "(ΔM a + ΔF) 1(t > t_c)",
+        ("time",),
+        ("gain_step", "load_drift", "friction_step"),
+        _payload_shapes,
+        separate_by="Move the same way with and without the payload, each in a recording.",
+    ),
+    Effect(
+        "gain_step",
+        "κ f 1(t > t_c)",
+        ("predicted_force", "time"),
+        ("payload_change", "friction_step"),
+        _gain_step_shapes,
+        _FORCE,
+        separate_by="Coast: a gain changes the force, not how friction brakes the free axis.",
     ),
     Effect(
         "load_drift",

@@ -46,6 +46,8 @@ _OF_TERM: Mapping[type, str] = {
     laws.GainAsymmetry: "gain_asymmetry",
     laws.ThermalDrift: "thermal_drift",
     laws.FrictionStep: "friction_step",
+    laws.PayloadChange: "payload_change",
+    laws.GainStep: "gain_step",
     laws.LoadDrift: "load_drift",
     laws.PeriodicDisturbance: "periodic_disturbance",
     laws.DisturbancePulses: "disturbance_pulses",

@@ -1,0 +1,66 @@
+"""What changes at one moment, on machines of a few lines: an arm in rad, a slide in mm."""
+
+import numpy as np
+import pytest
+
+import jaxfric as jf
+
+MOMENT = 5.0
+
+
+def ran(change, turning, seconds=12.0, rate=500):
+    """A recording of a loop whose `load` or `gain` is another from the moment on, and a simulator
+    of the axis as it was before.
+    """
+    size, inertia, weight, coulomb, viscous = (
+        (1.0, 0.8, 6.0, 1.5, 0.6) if turning else (150.0, 0.004, 0.0, 12.0, 0.02)
+    )
+    draw, step = np.random.default_rng(3), 1 / (4 * rate)
+    time = step * np.arange(round(seconds / step))
+    rates, sizes = 2 * np.pi * np.array([0.23, 0.61, 1.1]), size * np.array([0.5, 0.2, 0.08])
+    angles = rates * time[:, None] + draw.uniform(0, 2 * np.pi, 3)
+    goals, speeds = np.sin(angles) @ sizes, np.cos(angles) @ (sizes * rates)
+    place, speed, rows = goals[0], speeds[0], []
+    for now, goal, wanted in zip(time, goals, speeds, strict=True):
+        load = 1.3 if change == "load" and now > MOMENT else 1.0
+        gain = 1.2 if change == "gain" and now > MOMENT else 1.0
+        force = inertia * (3600 * (goal - place) + 120 * (wanted - speed)) + weight * np.cos(place)
+        resists = coulomb * np.tanh(speed / (1e-3 * size)) + viscous * speed
+        acting = force / gain - resists - load * weight * np.cos(place)
+        acceleration = acting / (load * inertia)
+        simulated = inertia * acceleration + weight * np.cos(place) + resists
+        rows.append((now, force, place, simulated))
+        speed += step * acceleration
+        place += step * speed
+    time, force, place, simulated = np.array(rows)[::4].T
+    force = force + 0.004 * np.sqrt(np.mean(force**2)) * draw.normal(size=force.size)
+    count = 2 * np.pi / 2**16 if turning else 1e-3
+    units = {"force": "N·m", "position": "rad"} if turning else {"force": "N", "position": "mm"}
+    recording = jf.Recording(time, force, count * np.round(place / count), units=units)
+    return recording, jf.simulators.Known(simulated)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turning", [True, False])
+@pytest.mark.parametrize(
+    ("change", "effect", "name", "relative"),
+    [
+        ("load", "payload_change", "payload_inertia", 0.3),
+        ("gain", "gain_step", "step_gain", None),
+    ],
+)
+def test_a_change_at_one_moment_is_named_with_it(change, effect, name, relative, turning):
+    recording, simulator = ran(change, turning)
+    found = jf.explain(recording, simulator)
+    best = found.findings[0]
+    assert best.effect == effect and best.share > 0.8
+    assert best.parameters["step_time"].value == pytest.approx(MOMENT, abs=0.1)
+    truth = 0.2 if relative is None else relative * (0.8 if turning else 0.004)
+    assert best.parameters[name].value == pytest.approx(truth, rel=0.1)
+    assert "At t = " in best.sentence
+
+
+@pytest.mark.slow
+def test_where_nothing_changes_no_moment_is_named():
+    recording, simulator = ran("", True)
+    assert jf.explain(recording, simulator).findings == []
