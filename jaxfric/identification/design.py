@@ -8,11 +8,13 @@ what the one leaves when the other is fitted in its place.
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .. import signals
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds, summands
 from ..terms.effects import effect
@@ -128,8 +130,9 @@ def separate(
 ) -> Design:
     """The motion along which found effects differ most from what they may be confused with.
 
-    The least, over effects and their rivals, of the force that the found term leaves when all
-    other terms and the rival are fitted in its place, is made as large as it can be.
+    What an effect leaves when all other terms and a rival are fitted in its place is made as large
+    as it can be, and what the rival leaves when the effect is. The recording that confuses them
+    told the parameters of neither: both are taken at many, and the mean of the logarithms counts.
 
     **Arguments:** `model`, the improved one; `rivals`, of each found effect its rivals' names.
 
@@ -143,10 +146,25 @@ def separate(
         left = [_left(model, motion, one, terms) for one, terms in pairs]
         return jnp.min(jnp.concatenate(left))
 
-    def cost(coefficients):
-        return -jnp.log(least(multisine(coefficients, limits)) + 1e-30)
+    own = [_placed(summands(model.term)[one], _scales(limits)) for one, _ in pairs]
+    # As arguments, not as constants, so that one program serves all models of one structure.
+    values = (model, [mine[1] for mine in own], [[b for _, b in terms] for _, terms in pairs])
+    kinds = tuple(
+        (one, mine[0], tuple(t for t, _ in terms))
+        for (one, terms), mine in zip(pairs, own, strict=True)
+    )
 
-    motion = multisine(_search(cost, limits, steps), limits)
+    def cost(coefficients, values):
+        model, own, rivals = values
+        motion = multisine(coefficients, limits)
+        apart = [
+            _apart(model, motion, one, (term, mine), (rival, betas))
+            for (one, term, others), mine, places in zip(kinds, own, rivals, strict=True)
+            for rival, betas in zip(others, places, strict=True)
+        ]
+        return -jnp.mean(jnp.stack(apart))
+
+    motion = multisine(_search(cost, limits, steps, values), limits)
     noise = _noise(model, first) if noise is None else float(noise)
     apart = (float(jnp.sqrt(least(first))), float(jnp.sqrt(least(motion))))
     names = tuple(f"{one} or {other}" for one, others in rivals.items() for other in others)
@@ -176,13 +194,24 @@ def _noise(model: Model, motion: Motion) -> float:
     return float(NOISE * jnp.sqrt(jnp.mean(force**2)))
 
 
-def _search(cost, limits: Limits, steps: int) -> Float[Array, "2 H"]:
-    """The best of descents from the plain sine and from drawn multisines."""
+def _search(cost, limits: Limits, steps: int, values=None) -> Float[Array, "2 H"]:
+    """The best of descents from the plain sine and from drawn multisines.
+
+    **Arguments:** `cost` of coefficients, and of `values` where there are any.
+    """
     plain = sine(limits)
     drawn = jax.random.normal(jax.random.key(0), (STARTS, 2, HARMONICS))
     drawn = drawn / jnp.arange(1, HARMONICS + 1, dtype=drawn.dtype)[None, None]
     starts = jnp.concatenate([(plain + 0.02 * drawn[0])[None], drawn[1:].astype(plain.dtype)])
-    found, least = jax.jit(lambda s: jax.lax.map(lambda one: descend(cost, one, steps), s))(starts)
+
+    @eqx.filter_jit
+    def all_of(starts, values):
+        def one(start):
+            return descend(cost if values is None else lambda c: cost(c, values), start, steps)
+
+        return jax.lax.map(one, starts)
+
+    found, least = all_of(starts, values)
     return found[int(jnp.nanargmin(least))]
 
 
@@ -200,10 +229,7 @@ def _pairs(model: Model, rivals: Mapping[str, Sequence[str]], limits: Limits):
     """For each pair of a found effect and a rival: the places of the effect's columns, and the
     rival's terms over its parameters.
     """
-    as_array = [float(np.float64(x)) for x in (0.006 * limits.velocity, limits.velocity)]
-    scales = Scales(*(jnp.asarray(x, float) for x in (
-        *as_array, -limits.position, limits.position, 1.0, 0.0, limits.duration, limits.interval
-    )))  # fmt: skip
+    scales = _scales(limits)
     pairs = []
     for name, others in rivals.items():
         kinds = {type(term) for term in effect(name).shapes(scales)}
@@ -218,6 +244,56 @@ def _pairs(model: Model, rivals: Mapping[str, Sequence[str]], limits: Limits):
                 )
             pairs.append((own[0], [_placed(term, scales) for term in terms[:1]]))
     return pairs
+
+
+def _scales(limits: Limits) -> Scales:
+    """What a motion within the limits would say about magnitudes."""
+    slowest = signals.SLIP_SHARE * limits.velocity
+    values = (slowest, limits.velocity, -limits.position, limits.position, 1.0, 0.0,
+              limits.duration, limits.interval)  # fmt: skip
+    return Scales(*(jnp.asarray(x, float) for x in values))
+
+
+def _apart(model: Model, motion: Motion, own: int, mine, rival) -> Float[Array, ""]:
+    """How well an effect and a rival are told apart: the mean of two mean logarithms.
+
+    Each of the share of its force that the other, and all other terms, do not account for, at
+    places of its own parameters, the found ones among them, the least over places of the other's.
+    """
+    parts = list(summands(model.term))
+    ends = np.cumsum([0, *(len(part.affine) for part in parts)])
+    others = Sum(tuple(part for i, part in enumerate(parts) if i != own))
+    base = orthonormal(columns(others, motion))
+    term, betas = mine
+    if term.nonlinear:
+        betas = jnp.concatenate([parts[own].beta()[None], betas])
+    weights = model.alpha[ends[own] : ends[own + 1]]
+    first = jax.lax.map(lambda b: columns(_bent(term, b), motion), betas)
+    second = jax.lax.map(lambda b: columns(_bent(rival[0], b), motion), rival[1])
+    equal = jnp.ones(second.shape[-1], weights.dtype)
+    both = _share(base, first, weights, second) + _share(base, second, equal, first)
+    return 0.5 * both
+
+
+def _bent(term: AbstractTerm, beta: Float[Array, " d"]) -> AbstractTerm:
+    return term.with_beta(beta) if term.nonlinear else term
+
+
+def _share(base, first: Float[Array, "P N p"], weights, second: Float[Array, "G N q"]):
+    """Mean over P of the logarithm of the least share left, over G, of the first's force."""
+    force = first @ weights
+    power = jnp.sum(force**2, axis=1)
+    force = force - (force @ base) @ base.T
+    second = second - jnp.einsum("nb,gbq->gnq", base, jnp.einsum("nb,gnq->gbq", base, second))
+    size = jnp.linalg.norm(second, axis=1)
+    second = second / jnp.where(size > 0, size, 1.0)[:, None]
+    square = jnp.einsum("gnq,gnr->gqr", second, second)
+    square = square + 1e-9 * jnp.eye(square.shape[-1], dtype=square.dtype)[None]
+    shared = jnp.einsum("gnq,pn->gqp", second, force)
+    taken = jnp.sum(shared * jnp.linalg.solve(square, shared), axis=1)
+    left = (jnp.sum(force**2, axis=1)[None] - taken) / jnp.where(power > 0, power, 1.0)[None]
+    # A millionth of the power is no difference: below it, nothing is gained.
+    return jnp.mean(jnp.log(jnp.maximum(jnp.min(left, axis=0), 0.0) + 1e-6))
 
 
 def _placed(term: AbstractTerm, scales: Scales):

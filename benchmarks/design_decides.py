@@ -1,0 +1,202 @@
+"""Whether the experiment that `jaxfric design` proposes decides between confusable effects.
+
+    python benchmarks/design_decides.py --cases 50 --seed 11 --out decides.json
+
+Axes are drawn with one effect and recorded along an unlucky motion: part of the stroke, one speed.
+Where this recording does not tell the true effect from others (`decide`), that is a case. Then the
+axis is recorded once more: along the motion of `design.separate`, along the first motion again, and
+along a plain sine within the limits of the design; `decide` says which effect each speaks for.
+"""
+
+import argparse
+import json
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxfric as jf
+from jaxfric.identification.deciding import decide, shapes
+from jaxfric.identification.design import separate
+from jaxfric.identification.motion import Limits, multisine, sine
+from jaxfric.terms.effects import EFFECTS as CATALOGUE
+
+jax.config.update("jax_enable_x64", True)
+LIMITS = Limits(0.1, 0.15, 2.0, 60.0, 12.0, 0.004)
+MASS, BANDWIDTH = 4.0, 60.0
+EFFECTS = (
+    "spring", "hardening_spring", "gravity_unbalance", "cogging", "periodic_disturbance",
+    "position_dependent_friction", "sticky_spot", "end_stop",
+)  # fmt: skip
+
+
+def machine(rng, effect):
+    """An axis with one effect of 10 to 40 % of the Coulomb level, in Newton."""
+    level = rng.uniform(8, 20)
+    base = {"inertia": MASS}
+    for sign in "+-":
+        base |= {f"coulomb{sign}": level * rng.uniform(0.9, 1.1)}
+        base |= {f"viscous{sign}": level / LIMITS.velocity * rng.uniform(0.1, 0.5)}
+    size, reach = level * rng.uniform(0.1, 0.4), LIMITS.position
+    angle = rng.uniform(0, 2 * np.pi)
+    terms = jf.terms
+    drawn = {
+        "spring": lambda: (terms.Spring(0.0), [size / reach * 1.7]),
+        "hardening_spring": lambda: (terms.HardeningSpring(), [2.6 * size / reach**3]),
+        "gravity_unbalance": lambda: (terms.GravityUnbalance(), wave(size, angle)),
+        "cogging": lambda: (terms.Cogging(), wave(size, angle)),
+        "periodic_disturbance": lambda: (terms.PeriodicDisturbance(), wave(size, angle)),
+        "position_dependent_friction": lambda: (
+            terms.PositionDependentFriction(),
+            wave(size, angle),
+        ),
+        "sticky_spot": lambda: (terms.StickySpot(), [2 * size]),
+        "end_stop": lambda: (terms.EndStop(), [8 * size / reach]),
+    }  # fmt: skip
+    term, alpha = drawn[effect]()
+    bent = {
+        "gravity_unbalance": [rng.uniform(3, 6) * reach],
+        "cogging": [rng.uniform(0.005, 0.02)],
+        "periodic_disturbance": [rng.uniform(3.0, 8.0)],
+        "position_dependent_friction": [rng.uniform(1.0, 4.0) * reach],
+        "sticky_spot": [rng.uniform(-0.3, 0.3) * reach, rng.uniform(0.1, 0.2) * reach],
+        "end_stop": [rng.uniform(0.2, 0.5) * reach],
+    }.get(effect, [])
+    model = jf.models.coulomb_viscous() + term
+    affine = [p.name for p in term.affine]
+    nonlinear = [p.name for p in term.nonlinear]
+    values = base | dict(zip(affine, alpha, strict=True)) | dict(zip(nonlinear, bent, strict=True))
+    return jf.models.from_parameters(model, values)
+
+
+def wave(size, angle):
+    """Sine and cosine of a wave of that root mean square."""
+    return [2**0.5 * size * np.sin(angle), 2**0.5 * size * np.cos(angle)]
+
+
+def unlucky(rng, effect):
+    """The first motion: one speed for what is a line, part of the stroke for what is a shape."""
+    t = np.arange(round(LIMITS.duration / LIMITS.interval) + 1) * LIMITS.interval
+    reach = LIMITS.position * rng.uniform(0.2, 0.5)
+    if effect in ("cogging", "periodic_disturbance"):
+        period = 4 * reach / (LIMITS.velocity * rng.uniform(0.3, 0.6))
+        phase = (t / period) % 1.0
+        # One speed, and reversals rounded over a tenth of the stroke's time.
+        x = reach * (1 - np.abs(4 * ((phase + 0.25) % 1.0) - 2))
+        width = max(int(0.05 * period / LIMITS.interval), 3)
+        kernel = np.hanning(width + 2)[1:-1]
+        padded = np.pad(x, width, mode="edge")
+        x = np.convolve(padded, kernel / kernel.sum(), "same")[width:-width]
+    else:
+        speed = LIMITS.velocity * rng.uniform(0.3, 0.6)
+        rate = speed / reach
+        x = reach * np.sin(rate * t)
+    return jf.Recording(t, 0 * t, position=x)
+
+
+def recorded(model, reference, seed):
+    """The axis in closed loop, with encoder and noise, the force centred on its sample."""
+    loop = jf.PD(kp=MASS * BANDWIDTH**2, kd=2 * MASS * BANDWIDTH)
+    run = jf.simulate(
+        model, reference, loop, encoder=jf.Encoder(2e-7), substeps=2, key=jax.random.key(seed)
+    )
+    force = np.asarray(run.force)
+    centred = 0.5 * (force + np.concatenate([force[:1], force[:-1]]))
+    noise = 0.02 * np.std(force) * np.random.default_rng(seed).normal(size=force.size)
+    # What the loop needs to settle is left out.
+    kept = slice(25, None)
+    return jf.Recording(
+        run.time[kept], jnp.asarray(centred + noise)[kept], position=run.position[kept]
+    )
+
+
+def along(motion):
+    """A designed motion as a set-point."""
+    return jf.Recording(motion.time, 0 * motion.time, position=motion.position)
+
+
+def case(seed):
+    """One drawn axis; `None` where nothing is confusable or the truth is not among it."""
+    rng = np.random.default_rng(seed)
+    effect = EFFECTS[int(rng.integers(len(EFFECTS)))]
+    model = machine(rng, effect)
+    first = unlucky(rng, effect)
+    log = recorded(model, first, seed)
+    scales = jf.signals.scales(jf.signals.prepare(log))
+    others = [r for r in CATALOGUE[effect].confusable_with if shapes(r, scales)]
+    improved = jf.models.coulomb_viscous() + shapes(effect, scales)[0]
+    # As `explain` would: the effect that leaves least, and those that it is not told from.
+    said = decide(jf.identify(improved, log).model, effect, others, log)
+    rivals = list(said.alike)
+    found = {"seed": seed, "true": effect, "named": said.effect, "rivals": rivals}
+    if not rivals or effect not in (said.effect, *rivals):
+        return found | {"case": False}
+    found["case"] = True
+    term = jf.models.coulomb_viscous() + shapes(said.effect, scales)[0]
+    told = jf.identify(term, log).model
+    start = time.perf_counter()
+    plan = separate(told, {said.effect: rivals}, LIMITS, steps=40)
+    found["design_seconds"] = time.perf_counter() - start
+    found["separation"] = plan.separation
+    motions = {
+        "designed": along(plan.motion),
+        "repeated": first,
+        "sine": along(multisine(sine(LIMITS), LIMITS)),
+    }
+    for number, (kind, reference) in enumerate(motions.items()):
+        log = recorded(model, reference, seed + 1_000_003 * (number + 1))
+        verdict = decide(told, said.effect, rivals, log)
+        found[kind] = {
+            "effect": verdict.effect, "decided": verdict.decided,
+            "right": verdict.effect == effect,
+            "above": {each.effect: round(each.above, 1) for each in verdict.standings},
+        }  # fmt: skip
+    return found
+
+
+def summary(cases):
+    """Counts over the cases: rightly and wrongly decided, not decided, best right."""
+    rows = {}
+    for kind in ("designed", "repeated", "sine"):
+        said = [c[kind] for c in cases]
+        rows[kind] = {
+            "decided rightly": sum(s["decided"] and s["right"] for s in said),
+            "decided wrongly": sum(s["decided"] and not s["right"] for s in said),
+            "not decided": sum(not s["decided"] for s in said),
+            "least error right": sum(s["right"] for s in said),
+        }
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("decides.json"))
+    arguments = parser.parse_args()
+    seen, seed = [], 10_000 * arguments.seed
+    while sum(c["case"] for c in seen) < arguments.cases:
+        try:
+            one = case(seed)
+        except ValueError as error:
+            one = {"seed": seed, "case": False, "error": str(error)}
+        seen.append(one)
+        seed += 1
+        short = {k: v for k, v in one.items() if k in ("seed", "true", "named", "rivals", "error")}
+        ways = {
+            k: (one[k]["effect"], one[k]["decided"])
+            for k in ("designed", "repeated", "sine")
+            if k in one
+        }
+        print(json.dumps(short | ways), flush=True)
+        cases = [c for c in seen if c["case"] and "designed" in c]
+        arguments.out.write_text(json.dumps({"summary": summary(cases), "cases": seen}, indent=1))
+    print(f"{len(seen)} axes drawn, {len(cases)} confusable cases")
+    for kind, row in summary(cases).items():
+        print(f"{kind:9}", row)
+
+
+if __name__ == "__main__":
+    main()
