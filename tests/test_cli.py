@@ -93,6 +93,7 @@ def test_one_recording_in_full(axis, tmp_path, capsys):
     said = " ".join(printed.out.split())
     for piece in (axis, "2001 samples", "2 s at 1000 Hz", "force in N", "closed windows", "± 95 %"):
         assert piece in said
+    assert "Columns: time, force from force [N], position from position [m], velocity" in said
     document = strict(out.read_text("utf-8"))
     check_identification(document)
     assert document["result"] == "successful"
@@ -106,6 +107,17 @@ def test_one_recording_in_full(axis, tmp_path, capsys):
 def test_a_dash_prints_nothing_but_the_document(axis, capsys):
     assert main(["identify", axis, *MODEL, "--json", "-"]) == 0
     check_identification(strict(capsys.readouterr().out))
+
+
+def test_it_is_said_which_column_serves_as_what(axis, tmp_path, capsys):
+    table = np.loadtxt(axis, delimiter=",", skiprows=1)
+    path = tmp_path / "odd.csv"
+    io.write_table(path, dict(zip(("t", "\x1b[2Jm", "x", "w"), table.T, strict=True)))
+    columns = ["--columns", "force=\x1b[2Jm,position=x,velocity=w", "--scale", "force=1000"]
+    assert main(["identify", str(path), *MODEL, *columns]) == 0
+    printed = capsys.readouterr().out
+    assert "\x1b" not in printed
+    assert "time from t" in printed and "position from x" in printed and "× 1000" in printed
 
 
 def test_what_the_recording_cannot_see_is_null_and_said(tmp_path, capsys):

@@ -297,6 +297,17 @@ def _add_simulate(commands) -> None:
         help="pd:kp=,kd= | pid:kp=,ki=,kd= | cascade:kp=,kv= (each also limit=); "
         "without one the force column drives",
     )
+    command.add_argument(
+        "--compensate",
+        nargs="?",
+        const="",
+        metavar="DRIVE.json",
+        help="add feed-forward by the model that the drive has (default: by the machine's own), "
+        "and say how much tracking error and controller force that removes",
+    )
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write that benefit; - prints it"
+    )
     options.reading(command)
 
 

@@ -6,6 +6,7 @@ _LINES = {
         "jaxfric identify axis.csv",
         "jaxfric identify axis.csv --model best --save model.json --plot friction.png",
         "jaxfric identify log.mat --columns time=t,position=qm,force=vir --scale force=35.15",
+        "jaxfric identify encoder.csv --counts-per-rev 8192",
         "jaxfric identify trace.csv --rate 1000 --units force=A,position=rad",
     ],
     "explain": [
@@ -17,7 +18,8 @@ _LINES = {
     ],
     "predict": ["jaxfric predict model.json axis.csv -o predicted.csv"],
     "simulate": [
-        "jaxfric simulate model.json reference.csv --controller pd:kp=5000,kd=300 -o run.csv"
+        "jaxfric simulate model.json reference.csv --controller pd:kp=5000,kd=300 -o run.csv",
+        "jaxfric simulate explained.json reference.csv --compensate drive.json -o run.csv",
     ],
     "export": [
         "jaxfric export model.json --to c -o axis.c",

@@ -31,7 +31,7 @@ def run(arguments: Namespace) -> int:
     holdout = None
     if arguments.holdout:
         holdout, more = _beside(arguments.holdout, recording, arguments)
-        notes = notes + [f"Held out: {note}" for note in more]
+        notes = notes + [f"Held out: {note}" for note in more if note != notes[0]]
     baseline = _baseline(arguments, recording, holdout)
     try:
         with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:

@@ -77,6 +77,7 @@ def _options(arguments: Namespace) -> fleet.Options:
         arguments.period,
         arguments.repair,
         arguments.rate,
+        arguments.counts_per_rev,
     )
 
 

@@ -18,7 +18,8 @@ PICTURES = ("png", "pdf", "svg")
 
 # What the options of every command read, and what they write.
 READ = (
-    "file", "files", "model", "baseline", "simulation", "simulation_holdout", "holdout", "mujoco"
+    "file", "files", "model", "compensate", "baseline", "simulation", "simulation_holdout",
+    "holdout", "mujoco",
 )  # fmt: skip
 WRITTEN = ("out", "json", "save", "report", "plot")
 
@@ -225,6 +226,13 @@ def reading(command: ArgumentParser) -> None:
         type=rate,
         metavar="HZ",
         help="samples per second of a file without a time column",
+    )
+    group.add_argument(
+        "--counts-per-rev",
+        type=positive,
+        metavar="N",
+        help="encoder counts of a revolution: a position in counts becomes rad, or the rev or deg "
+        "that --units position= names",
     )
     group.add_argument(
         "--no-repair",

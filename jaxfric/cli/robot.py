@@ -141,6 +141,7 @@ def _log(
         log, notes = read_with_notes(
             path, columns=roles, scale=scale, units=units, period=arguments.period,
             repair=arguments.repair, rate=arguments.rate,
+            counts_per_rev=arguments.counts_per_rev,
         )  # fmt: skip
     return log, notes
 

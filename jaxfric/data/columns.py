@@ -101,6 +101,16 @@ def stated_unit(name: str, role: str) -> str | None:
     return next((u for t in tails if len(t) > 1 and (u := unit_of(t, role))), None)
 
 
+def served(chosen: Mapping[str, str], scale: Mapping[str, float]) -> str:
+    """Which column serves as what, and the factors."""
+    said = []
+    for role, column in chosen.items():
+        factor = f" × {scale[role]:g}" if scale.get(role, 1.0) != 1.0 else ""
+        name = column if column.isprintable() else repr(column)
+        said.append(f"{role}{f' from {name}' if column != role else ''}{factor}")
+    return f"Columns: {', '.join(said)}."
+
+
 def unknown_units(chosen: Mapping[str, str], scale: Mapping[str, float]) -> list[str]:
     """A sentence for each bracket in the name of a needed column that is no unit of it."""
     sentences = []

@@ -16,6 +16,7 @@ from .printable import encodable
 from .provenance import sha256
 from .recording import Recording
 from .tables import load
+from .turns import angles
 from .writing import (
     write_bytes as write_bytes,
     write_table as write_table,
@@ -35,6 +36,7 @@ def read(
     period: Mapping[str, float] | None = None,
     repair: bool = True,
     rate: float | None = None,
+    counts_per_rev: float | None = None,
 ) -> Recording:
     """Read one log: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`, or a robot's bag (rosbag2, MCAP).
 
@@ -55,6 +57,8 @@ def read(
     - `repair`: with `False` all samples stay as they are, but for those that cannot be computed
       with: what is not finite is masked, and stamps that do not increase are an error.
     - `rate`: samples per second of a file that has no time column, 1/s.
+    - `counts_per_rev`: encoder counts of a revolution; a position in counts becomes radians, or
+      the `deg` or `rev` that `units` names, and a velocity in counts/s likewise.
 
     **Returns:** a `Recording` with signals of shape `(N,)`, in jax's default float type.
 
@@ -69,6 +73,7 @@ def read(
         period=period,
         repair=repair,
         rate=rate,
+        counts_per_rev=counts_per_rev,
     )[0]
 
 
@@ -82,9 +87,13 @@ def read_with_notes(
     period: Mapping[str, float] | None = None,
     repair: bool = True,
     rate: float | None = None,
+    counts_per_rev: float | None = None,
     set_point: bool = False,
+    served: bool = False,
 ) -> tuple[Recording, list[str]]:
     """[`read`][] together with one plain sentence for each thing that was put in order.
+
+    With `served` the first sentence says which column serves as what.
 
     With `set_point` the file may hold what an axis should do instead of what it did: time and a
     reference, a position or a force are enough, and a force that is absent is zero.
@@ -99,8 +108,11 @@ def read_with_notes(
         columns = dict(columns or {}) | {"time": CLOCK}
     chosen = names.assign(table.columns, columns, source, set_point)
     _check_arguments(chosen, scale, units, period, source)
+    if counts_per_rev is not None:
+        scale, units = angles(chosen, scale, units, counts_per_rev, source)
     names.check_per_second(chosen, scale, source)
-    notes = table.notes + names.unknown_units(chosen, scale)
+    notes = [names.served(chosen, scale)] if served else []
+    notes += table.notes + names.unknown_units(chosen, scale)
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
         for role, name in chosen.items()

@@ -19,8 +19,8 @@ class Options(NamedTuple):
     """All that the rows of a fleet depend on, beside its files.
 
     `model`, a name; `projection`, "auto", "closed-windows" or "weak-form"; `bounds` of nonlinear
-    parameters; `columns`, `scale`, `units`, `period`, `repair` and `rate` as [`jaxfric.read`][]
-    takes them.
+    parameters; `columns`, `scale`, `units`, `period`, `repair`, `rate` and
+    `counts_per_rev` as [`jaxfric.read`][] takes them.
     """
 
     model: str = "gaussian"
@@ -32,11 +32,12 @@ class Options(NamedTuple):
     period: Mapping[str, float] = {}
     repair: bool = True
     rate: float | None = None
+    counts_per_rev: float | None = None
 
     @property
     def reading(self) -> dict[str, Any]:
         """The arguments of [`jaxfric.read`][]."""
-        names = ("columns", "scale", "units", "period", "repair", "rate")
+        names = ("columns", "scale", "units", "period", "repair", "rate", "counts_per_rev")
         return {name: getattr(self, name) for name in names}
 
 
