@@ -22,9 +22,9 @@ import jax
 # Bytes of programs in the folder, from 0.1 MB for a term's columns to 2 MB for an identification;
 # of more the one that was not used for longest goes.
 MOST = 128 * 2**20
-# XLA's newer way to emit loops, and its optimisation of them, take five times as long to compile
-# an identification as it then runs quicker on 50,000 samples. What runs hundreds of times is
-# optimised a little.
+# XLA's newer way to emit loops takes a quarter longer to compile an identification and runs no
+# quicker. Its optimisation takes five times as long as it then gains on 50,000 samples: what runs
+# hundreds of times is optimised a little, and what has more samples wholly.
 _QUICK: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
 LITTLE = 1
 QUICK_SAMPLES = 2**16
@@ -70,8 +70,8 @@ def kept(*steps: Callable, optimised: int = 0) -> Callable:
     plain = [eqx.filter_jit(step) for step in steps]
 
     @cache
-    def quick():
-        options = quick_options(optimised)
+    def quick(level):
+        options = quick_options(level)
         return [eqx.filter_jit(step, compiler_options=options) for step in steps]
 
     @wraps(steps[-1])
@@ -80,7 +80,7 @@ def kept(*steps: Callable, optimised: int = 0) -> Callable:
             return _in_turn(plain, arguments)
         if _store is not None:
             return _in_turn(_programs(steps, arguments, optimised, _store), arguments)
-        return _in_turn(quick() if _few(arguments) else plain, arguments)
+        return _in_turn(quick(optimised if _few(arguments) else None), arguments)
 
     return call
 
@@ -93,9 +93,13 @@ def _in_turn(steps, arguments):
 
 
 @cache
-def quick_options(optimised: int = 0) -> dict[str, Any]:
-    """Options of XLA that compile quickly what is run a few times; those that this jaxlib knows."""
-    options = _QUICK | {"xla_backend_optimization_level": optimised}
+def quick_options(optimised: int | None = 0) -> dict[str, Any]:
+    """Options of XLA that compile quickly what is run a few times; those that this jaxlib knows.
+
+    `optimised`: how much, `None` for wholly.
+    """
+    level = {} if optimised is None else {"xla_backend_optimization_level": optimised}
+    options = _QUICK | level
 
     def known(name: str) -> bool:
         with suppress(jax.errors.JaxRuntimeError):
@@ -144,7 +148,7 @@ class _Program:
         self.known = found is not None
         if found is None:
             lowered, self.template = _lower(function, arguments)
-            options = quick_options(optimised) if _few(arguments) else None
+            options = quick_options(optimised if _few(arguments) else None)
             self.binary = pool.submit(lowered.compile, options)
         else:
             binary, self.template = found
