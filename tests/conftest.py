@@ -52,19 +52,22 @@ settings.register_profile("jaxfric", deadline=None, derandomize=True, max_exampl
 settings.load_profile("jaxfric")
 
 
-# Every compiled program takes some of the 65 530 memory maps that Linux gives a process by default;
-# the next compilation after the last of them aborts the process.
-MOST_MAPS = 10_000
+# Every compiled program takes some thousand of the 65 530 memory maps that Linux gives a process by
+# default; the next compilation after the last of them aborts the process.
+MOST_MAPS = 15_000
 
 
-@pytest.fixture(scope="module", autouse=True)
-def few_programs():
-    """After a file of tests, compiled programs are let go where there are too many."""
-    yield
+def memory_maps() -> int:
     maps = Path("/proc/self/maps")
-    if maps.exists() and len(maps.read_bytes().splitlines()) > MOST_MAPS:
+    return maps.read_bytes().count(b"\n") if maps.exists() else 0
+
+
+def pytest_runtest_teardown(held=[0]):  # noqa: B006
+    """After a test, compiled programs are let go where many have come since the last time."""
+    if memory_maps() > held[0] + MOST_MAPS:
         jax.clear_caches()
         gc.collect()
+        held[0] = memory_maps()
 
 
 @pytest.fixture(scope="session", autouse=True)
