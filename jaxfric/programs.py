@@ -22,9 +22,10 @@ import jax
 # Bytes of programs in the folder, from 0.1 MB for a term's columns to 2 MB for an identification;
 # of more the one that was not used for longest goes.
 MOST = 128 * 2**20
-# XLA's newer way to emit loops takes a quarter longer to compile an identification and runs no
-# quicker. Its optimisation takes five times as long as it then gains on 50,000 samples: what runs
-# hundreds of times is optimised a little, and what has more samples wholly.
+# XLA's newer way to emit loops takes 1.3 (optimised) to 2.5 times as long to compile an
+# identification and runs no quicker. Its optimisation takes five times as long as it then gains on
+# 50,000 samples: what runs hundreds of times is optimised a little, and what has more samples
+# wholly.
 _QUICK: dict[str, Any] = {"xla_cpu_use_fusion_emitters": False}
 LITTLE = 1
 QUICK_SAMPLES = 2**16

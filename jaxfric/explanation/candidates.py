@@ -26,7 +26,7 @@ GRID = 24
 # Terms of one moment, which is told to within a ramp only.
 STEPS = (laws.FrictionStep, laws.PayloadChange, laws.GainStep)
 # Effects that time alone drives: another recording need not show them.
-OF_THE_MOMENT = frozenset(  # fmt: skip
+OF_THE_MOMENT = frozenset(
     {
         "friction_step",
         "load_drift",

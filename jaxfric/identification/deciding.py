@@ -1,8 +1,8 @@
 """Which of several effects a recording speaks for: each in place of the others, row by row.
 
 What a second recording is made for (`design.separate`): the improved model with the found effect,
-and with each of its rivals instead, is identified from it anew; what they leave
-of the rows of the weak form is compared.
+and with each of its rivals instead, is identified from it anew; what they leave of the rows of the
+weak form is compared.
 """
 
 from collections.abc import Sequence
