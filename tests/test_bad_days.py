@@ -320,7 +320,9 @@ def test_usual_expressions_are_taken(text):
 def test_a_row_of_numpy_has_its_diagnosis():
     number = result_names().index("no_slip")
     alone = eqx.tree_at(lambda r: r._value, Result.no_slip, np.int32(number))
-    nothing = dict.fromkeys(("model", "covariance", "windows", "covered", "force_error", "cost"))
+    nothing = dict.fromkeys(
+        ("model", "covariance", "windows", "covered", "filtered_force_error", "cost")
+    )
     found = Identified(result=alone, projection="weak_form", open_ends=None, **nothing)
     assert found.diagnosis.startswith("The axis never slips")
 

@@ -37,7 +37,10 @@ def test_a_motion_on_which_two_effects_differ_decides(model):
     assert spring.effect == "spring" and spring.decided
     hardening = decide(model, "spring", ("hardening_spring",), log(0.2, lambda x: 4e4 * x**3, 1))
     assert hardening.effect == "hardening_spring" and hardening.decided
-    assert hardening.standings[0].force_error < 0.5 * hardening.standings[1].force_error
+    assert (
+        hardening.standings[0].filtered_force_error
+        < 0.5 * hardening.standings[1].filtered_force_error
+    )
 
 
 def test_a_motion_on_which_they_are_alike_does_not(model):

@@ -341,7 +341,7 @@ def rows_like(values, error=0.1, axes=1):
     many = [a_file(f"{i}.csv", f"axis{i % axes}") for i in range(len(values))]
     parameters = [{"coulomb+": {"value": v, "standard_error": error, "unit": "N"}} for v in values]
     rows = {
-        f.path: {"result": "successful", "force_error": 0.02, "parameters": p}
+        f.path: {"result": "successful", "filtered_force_error": 0.02, "parameters": p}
         for f, p in zip(many, parameters, strict=True)
     }
     return many, rows
@@ -356,7 +356,7 @@ def test_outliers_are_told_in_any_unit(unit):
     assert found.outliers[0].chance < 0.01
     (usual, error) = found.usual
     assert abs(usual.median / unit - 10) < 0.3 and 0.3 < usual.deviation / unit < 0.8
-    assert error.name == "force_error" and error.recordings == 60
+    assert error.name == "filtered_force_error" and error.recordings == 60
 
 
 def test_a_value_that_is_hardly_known_is_no_outlier():
@@ -439,7 +439,7 @@ def test_the_columns_have_the_same_types_even_where_they_are_empty(tmp_path):
     schema = pyarrow.parquet.read_schema(tmp_path / "a.parquet")
     kinds = {name: str(schema.field(name).type) for name in schema.names}
     assert kinds["coulomb+"] == kinds["coulomb+_standard_error"] == "double"
-    assert kinds["force_error"] == "double" and kinds["windows"] == "int64"
+    assert kinds["filtered_force_error"] == "double" and kinds["windows"] == "int64"
     assert kinds["reason"] == kinds["axis"] == kinds["coulomb+_unit"] == "string"
     assert rows_of(tmp_path / "a.csv")[1]["reason"] == 'why, "so"'
 

@@ -47,7 +47,9 @@ def batch(fit):
     failed = result_names().index("no_slip")
     many = eqx.tree_at(lambda f: f.result._value, many, many.result._value.at[3].set(failed))
     return eqx.tree_at(
-        lambda f: (f.force_error, f.model.alpha), many, replace_fn=lambda x: x.at[3].set(jnp.nan)
+        lambda f: (f.filtered_force_error, f.model.alpha),
+        many,
+        replace_fn=lambda x: x.at[3].set(jnp.nan),
     )
 
 
@@ -137,7 +139,9 @@ def test_a_fit_prints_model_parameters_and_how_it_ended(fit):
     assert "model lorentzian; closed windows (1 window, " in printed
     assert re.search(r"coulomb\+ +\d+\.\d+ +\d\.\d+ +N\n", printed)
     assert re.search(r"viscous- +\d+\.\d+ +\d\.?\d* +N·s/m\n", printed)
-    assert f"force error {float(fit.force_error):.2%}   result successful" in printed
+    assert (
+        f"filtered force error {float(fit.filtered_force_error):.2%}   result successful" in printed
+    )
     assert max(map(len, printed.splitlines())) <= text.WIDTH
 
 
@@ -154,7 +158,7 @@ def test_what_is_not_visible_is_said(fit, variance):
     assert re.search(r"coulomb\+ +- +not visible +N\n", str(blind))
     data = json.dumps(blind.to_dict(), allow_nan=False)
     assert json.loads(data)["parameters"]["coulomb+"]["standard_error"] is None
-    unknown = eqx.tree_at(lambda f: f.force_error, fit, jnp.nan)
+    unknown = eqx.tree_at(lambda f: f.filtered_force_error, fit, jnp.nan)
     assert "force error unknown" in str(unknown)
 
 
@@ -237,7 +241,7 @@ def test_a_batch_says_how_many_and_medians(batch, fit):
     assert "not successful: row 3." in printed
     median = f"{float(fit.parameters['coulomb+'].value):.5g}"
     assert re.search(rf"coulomb\+( +{median}){{3}} +[\d.]+  N\n", printed)
-    assert f"{float(fit.force_error):.2%}" in printed
+    assert f"{float(fit.filtered_force_error):.2%}" in printed
     assert "medians of 4 rows" in str(batch.model)
     lost = eqx.tree_at(lambda f: f.result._value, batch, jnp.full(4, 1, jnp.int32))
     assert "None is successful" in str(lost)
@@ -257,7 +261,7 @@ def test_traced_and_without_values_the_structure_is_printed(fit, batch, recordin
 
     def look(*trees):
         seen.extend([repr(tree) for tree in trees] + [tree._repr_html_() for tree in trees])
-        return trees[0].force_error
+        return trees[0].filtered_force_error
 
     jax.jit(look)(fit, recording, fit.model)
     jax.vmap(look, in_axes=(0, None))(batch, recording)
@@ -298,7 +302,7 @@ def test_the_pytrees_stay_what_they_were(fit, recording):
         assert all(isinstance(leaf, jax.Array | np.ndarray) for leaf in leaves)
         assert jax.tree.structure(again) == structure and str(again) == str(tree)
     assert {f.name for f in dataclasses.fields(fit)} == {
-        "model", "covariance", "result", "windows", "covered", "force_error", "cost",
+        "model", "covariance", "result", "windows", "covered", "filtered_force_error", "cost",
         "open_ends", "projection", "rival", "warnings",
     }  # fmt: skip
 

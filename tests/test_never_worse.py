@@ -243,3 +243,22 @@ def test_a_narrow_bump_is_no_higher_than_the_largest_force():
         regression.bounded(columns, target, np.array([False, False]), 4.0),
         regression.solve(columns, target),
     )
+
+
+def test_identify_says_the_force_error_of_predict(tmp_path, healthy, capsys):
+    log, model, out, document = (tmp_path / n for n in ("log.csv", "m.json", "o.csv", "i.json"))
+    run = healthy[0]
+    io.write_table(log, {name: getattr(run, name) for name in ("time", "position", "force")})
+    told = ["identify", str(log), "--model", "coulomb-viscous", "--save", str(model)]
+    assert main([*told, "--json", str(document)]) == 0
+    printed, said = capsys.readouterr().out, json.loads(document.read_text())
+    assert main(["predict", str(model), str(log), "-o", str(out)]) == 0
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    moving = table["in_motion"] > 0
+    left, force = (table["measured_force"] - table["force"])[moving], table["measured_force"]
+    by_subtraction = np.linalg.norm(left) / np.linalg.norm(force[moving])
+    assert said["force_error"] == pytest.approx(by_subtraction, rel=1e-9)
+    assert f"force error {by_subtraction:.2%}; filtered force error" in printed
+    # Which of the two is the larger depends on the noise and on how the speed varies.
+    assert said["filtered_force_error"] > 0
+    assert said["filter_half_width"] > 0

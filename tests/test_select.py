@@ -53,15 +53,17 @@ def test_the_standings_are_those_of_identifying_each_one():
     slow = {c.name: c for c in jf.select(recording, models).candidates}
     quick = {c.name: c for c in jf.select(recording, tuple(models)).candidates}
     for name in models:
-        assert quick[name].force_error == pytest.approx(slow[name].force_error, rel=0.03)
+        assert quick[name].filtered_force_error == pytest.approx(
+            slow[name].filtered_force_error, rel=0.03
+        )
         assert quick[name].parameters == slow[name].parameters
 
 
 def test_the_interval_and_the_order():
     found = jf.select(machine("gaussian", 1))
-    errors = [c.force_error for c in found.candidates]
+    errors = [c.filtered_force_error for c in found.candidates]
     assert errors == sorted(errors) and len(errors) == len(jf.models.names())
-    assert all(0 < c.half_width < c.force_error for c in found.candidates)
+    assert all(0 < c.half_width < c.filtered_force_error for c in found.candidates)
 
 
 def test_the_command(tmp_path, capsys, monkeypatch):

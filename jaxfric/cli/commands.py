@@ -28,6 +28,7 @@ from ..looks.text import text
 from ..models import Model
 from ..programs import kept_in
 from ..signals import kernel_half_width, prepare
+from ..simulation.prediction import force_error
 from ..units import SI
 from .options import message, printable, say, standard
 
@@ -169,7 +170,9 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
         name, chosen = standings.name, {"selection": standings.to_dict()}
     name, found = fitted(recording, name, arguments.projection, arguments.bounds)
     test = constant_velocity(recording, found)
-    document = documents.identification(found, recording, notes, test)
+    document = documents.identification(
+        found, recording, notes, test, force_error(found.model, recording)
+    )
     document |= {"name": name} | chosen
     if arguments.save or arguments.plot:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):

@@ -7,6 +7,7 @@ from ..data.io import read, write_table, write_text
 from ..explanation import explain
 from ..identification import documents, tabulate
 from ..report import page, pictures
+from ..simulation.prediction import force_error
 from ..validation import concealed
 from . import commands
 from .commands import today
@@ -26,7 +27,8 @@ def run(arguments: Namespace) -> int:
     _record(machine, folder)
     recording, holdout = (read(folder / f"{name}.csv") for name in ("axis", "holdout"))
     name, fitted = commands.fitted(recording, machine.baseline)
-    document = documents.identification(fitted, recording) | {"name": name}
+    error = force_error(fitted.model, recording)
+    document = documents.identification(fitted, recording, force_error=error) | {"name": name}
     say("A simulated axis in closed loop, with an encoder, noise, and something concealed.\n")
     say(tabulate.identification(document))
     say("\nWhat does this model leave out?\n")

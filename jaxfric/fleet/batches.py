@@ -92,9 +92,9 @@ class Batches:
 
 def row(found: Identified, item: Item) -> Row:
     """One recording's row: circumstances, then each parameter's value, standard error and unit."""
-    document = documents.identification(found, item.recording)
+    document = documents.identification(found)
     facts = {name: item.facts[name] for name in ("samples", "duration", "sample_rate")}
-    kept = ("result", "projection", "windows", "covered", "force_error")
+    kept = ("result", "projection", "windows", "covered", "filtered_force_error")
     reason = "" if document["result"] == "successful" else document["diagnosis"]
     named = ", ".join(warning["name"] for warning in document["warnings"])
     circumstances = facts | {name: document[name] for name in kept}

@@ -20,7 +20,7 @@ FEWEST_OF_AXIS = 4
 # Rousseeuw & Croux 1993).
 DEVIATIONS = 1.4826
 EFFICIENCY = 0.37
-FORCE_ERROR = "force_error"
+FORCE_ERROR = "filtered_force_error"
 
 Numbers = Float[np.ndarray, " n"]
 
@@ -113,8 +113,8 @@ def _gathered(files, rows, of) -> list[tuple[str, _Values]]:
             if entry["value"] is not None and entry["standard_error"] is not None:
                 place = found.setdefault((of(file), name, entry["unit"]), [])
                 place.append((file, entry["value"], entry["standard_error"]))
-        if row["force_error"]:
-            found.setdefault((of(file), FORCE_ERROR, "1"), []).append((file, row["force_error"], 0))
+        if row.get(FORCE_ERROR):
+            found.setdefault((of(file), FORCE_ERROR, "1"), []).append((file, row[FORCE_ERROR], 0))
     return [
         (group, _Values(name, unit, [e[0] for e in entries], *_arrays(entries)))
         for (group, name, unit), entries in found.items()

@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 
 from .files import File
 
-SCHEMA = "jaxfric.fleet/1"
+SCHEMA = "jaxfric.fleet/2"
 Row = dict[str, Any]
 
 

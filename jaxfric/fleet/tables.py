@@ -22,7 +22,7 @@ _FACTS = {
     "duration": float,
     "sample_rate": float,
     "result": str,
-    "force_error": float,
+    "filtered_force_error": float,
     "projection": str,
     "windows": int,
     "covered": float,

@@ -41,9 +41,9 @@ def _table(found: Any, chosen: np.ndarray) -> list[list[str]]:
         values = np.ravel(estimate.value)[chosen][seen]
         width = f"{np.median(half[seen]):.2g}" if seen.any() else "not visible"
         table.append([name, *_spread(values, "{:.5g}"), width, estimate.unit])
-    errors = np.ravel(found.force_error)[chosen]
+    errors = np.ravel(found.filtered_force_error)[chosen]
     errors = errors[np.isfinite(errors)]
-    return [*table, ["force error", *_spread(errors, "{:.2%}"), "", ""]]
+    return [*table, ["filtered force error", *_spread(errors, "{:.2%}"), "", ""]]
 
 
 def _spread(values: np.ndarray, form: str) -> list[str]:

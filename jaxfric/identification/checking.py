@@ -35,17 +35,17 @@ def checked(
     host = jax.tree.map(np.asarray, (found, design, motion))
     for i in range(len(warnings)):
         row, own, where = jax.tree.map(lambda x, i=i: x[i], host) if faults.ndim == 2 else host
-        fitted = checks.fitted(own, float(row.force_error))
+        fitted = checks.fitted(own, float(row.filtered_force_error))
         time, position, mask = where
         alpha, sure = _certain(row)
         if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
-            fitted[STRUCTURE] = float(row.force_error)
+            fitted[STRUCTURE] = float(row.filtered_force_error)
         warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         if (negative := _negative(row)) > 0:
             warnings[i, checks.NAMES.index("negative_parameter")] = negative
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
-    warnings = warnings.reshape(faults.shape).astype(np.asarray(found.force_error).dtype)
+    warnings = warnings.reshape(faults.shape).astype(np.asarray(found.filtered_force_error).dtype)
     return dataclasses.replace(
         found, warnings=jnp.asarray(warnings), result=_contradicted(found.result, wrong)
     )

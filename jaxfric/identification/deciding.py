@@ -30,7 +30,7 @@ class Standing(NamedTuple):
     """
 
     effect: str
-    force_error: float
+    filtered_force_error: float
     above: float
 
 

@@ -7,9 +7,10 @@ from typing import Any
 
 from ..data.printable import json_text
 from ..data.provenance import versions
-from ..data.recording import Recording
+from ..data.recording import Recording, uniform
 from ..data.summary import facts
 from ..models import name_of
+from ..signals import interval, kernel_half_width, prepare
 from .constant_velocity import ConstantVelocity, remark as contradicts, sentence
 
 IDENTIFICATION = "jaxfric.identification/1"
@@ -20,11 +21,14 @@ def identification(
     recording: Recording | None = None,
     notes: Sequence[str] = (),
     test: ConstantVelocity | None = None,
+    force_error: float | None = None,
 ) -> dict[str, Any]:
     """An `Identified` as plain data (schema `jaxfric.identification/1`).
 
     **Arguments:** `recording` that it was identified from, with the `notes` of its reader, so that
-    its facts are told as well; its constant-velocity `test`, which may warn.
+    its facts are told as well; its constant-velocity `test`, which may warn; `force_error` of
+    `predict` with the model, null where it was not computed. The `filtered_force_error` is that of
+    the rows, through the weak form's kernel of `filter_half_width` seconds.
     """
     parameters = {
         name: {
@@ -49,13 +53,21 @@ def identification(
         "open_ends": open_ends(found),
         "result": found.result_name,
         "diagnosis": found.diagnosis,
-        "force_error": float(found.force_error),
+        "force_error": force_error,
+        "filtered_force_error": float(found.filtered_force_error),
+        "filter_half_width": None if recording is None else _half_width(recording),
         "warnings": [remark.to_dict() for remark in remarks],
         "versions": versions(),
     }
     if test is not None:
         document["constant_velocity"] = test.to_dict() | {"summary": sentence(test, units)}
     return document
+
+
+def _half_width(recording: Recording) -> float:
+    """Half the width of the kernel that the weak form's rows have by default, s."""
+    prepared = prepare(uniform(recording))
+    return kernel_half_width(prepared) * float(interval(prepared))
 
 
 def saved(model: Any, *recordings: Recording | None) -> dict[str, Any]:

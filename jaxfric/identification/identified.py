@@ -86,7 +86,8 @@ class Identified(eqx.Module):
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible.
     - `result`: a member of [`Result`][].
     - `windows`, `covered`: how many windows were used and which share of the slip time they hold.
-    - `force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia included.
+    - `filtered_force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia
+      included: what `predict` misses through the kernel that the rows have.
     - `cost`: the minimum of the reduced cost, N²·s.
     - `open_ends`: by how much the affine parameters would have been off had the whole record been
       used, open ends and all: M D⁻¹ ∫ v̇ g dt, in the order of the affine parameters, `(p,)`;
@@ -103,7 +104,7 @@ class Identified(eqx.Module):
     result: Result
     windows: Float[Array, ""]
     covered: Float[Array, ""]
-    force_error: Float[Array, ""]
+    filtered_force_error: Float[Array, ""]
     cost: Float[Array, ""]
     open_ends: Float[Array, " p"]
     projection: str = eqx.field(static=True)
@@ -116,7 +117,7 @@ class Identified(eqx.Module):
         # By its name: equinox has no words for a member that is a number of numpy.
         said = str(Result[getattr(Result, self.result_name)])
         if self.result_name == "not_described":
-            return f"{said} {float(self.force_error):.0%} of the force is left."
+            return f"{said} {float(self.filtered_force_error):.0%} of the force is left."
         if self.result_name == "ambiguous":
             return f"{said} The other one: {self._elsewhere()}."
         return said

@@ -34,7 +34,7 @@ class Candidate(NamedTuple):
     name: str
     parameters: int
     held_out: np.ndarray
-    force_error: float
+    filtered_force_error: float
     half_width: float = np.nan
 
 
@@ -104,7 +104,10 @@ def select(
 
 
 def _chosen(standings: Sequence[Candidate]) -> Selection:
-    able = sorted((c for c in standings if np.isfinite(c.force_error)), key=lambda c: c.force_error)
+    able = sorted(
+        (c for c in standings if np.isfinite(c.filtered_force_error)),
+        key=lambda c: c.filtered_force_error,
+    )
     if not able:
         raise ValueError(
             "No candidate could be identified on every fold: the recording is too short or hardly "

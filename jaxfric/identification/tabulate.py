@@ -55,7 +55,7 @@ def identified(
     automatic: bool = False,
 ) -> list[Block]:
     """The paragraphs and the table of [`identification`][]; the recording may be absent."""
-    result = f"force error {_percent(document['force_error'])}   result {document['result']}"
+    result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
     if said := document.get("constant_velocity", {}).get("summary"):
         told.append(said)
@@ -77,7 +77,7 @@ def standings(document: Mapping[str, Any]) -> list[Block]:
     for entry in document["candidates"]:
         name = entry["name"]
         mark = "*" if name == document["model"] else "=" if name in document["tied"] else ""
-        error, half = f"{entry['force_error']:.3%}", f"{entry['half_width']:.2%}"
+        error, half = f"{entry['filtered_force_error']:.3%}", f"{entry['half_width']:.2%}"
         table.append([mark, name, str(entry["parameters"]), error, half])
     said = f"* chosen: {document['model']}"
     if len(document["tied"]) > 1:
@@ -85,8 +85,17 @@ def standings(document: Mapping[str, Any]) -> list[Block]:
     return [Table(table, (2, 3, 4)), [said, *([document["reason"]] if document["reason"] else [])]]
 
 
-def _percent(share: float) -> str:
-    return f"{share:.2%}" if math.isfinite(share) else "unknown"
+def _percent(share: float | None) -> str:
+    return f"{share:.2%}" if share is not None and math.isfinite(share) else "unknown"
+
+
+def _errors(document: Mapping[str, Any]) -> str:
+    """The force error of `predict`, where it was computed, and the one through the kernel."""
+    filtered = f"filtered force error {_percent(document['filtered_force_error'])}"
+    if document["force_error"] is None:
+        return filtered
+    span = 2e3 * document["filter_half_width"]
+    return f"force error {_percent(document['force_error'])}; {filtered} ({span:.3g} ms)"
 
 
 def many(documents: Sequence[Mapping[str, Any]]) -> str:
@@ -98,7 +107,7 @@ def many(documents: Sequence[Mapping[str, Any]]) -> str:
     rows = [head, ["", "", "", *(units[name] for name in names), ""]]
     for document in documents:
         cells = [_cell(document["parameters"].get(name)) for name in names]
-        error = f"{document['force_error']:.2%}"
+        error = _percent(document["force_error"])
         file = _name(document)
         rows.append([file, document["name"], error, *cells, document["result"]])
     if same_model:

@@ -40,7 +40,8 @@ def figure(found: Identified, recording: Recording):
     drawing.friction(curve, sides, units, spell(VELOCITY, units), curves.name(recording.source))
     _time(time, rest, rows, units["force"])
     time.set_title(
-        f"Force, averaged over {1e3 * kernel:.3g} ms; force error {float(found.force_error):.2%}"
+        f"Force, averaged over {1e3 * kernel:.3g} ms; "
+        f"filtered force error {float(found.filtered_force_error):.2%}"
     )
     return picture
 
