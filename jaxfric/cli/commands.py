@@ -28,7 +28,7 @@ from ..looks.text import text
 from ..models import Model
 from ..programs import kept_in
 from ..signals import kernel_half_width, prepare
-from ..simulation.prediction import force_error
+from ..simulation.prediction import delay_of, force_error, in_motion, relative, residual
 from ..units import SI
 from .options import message, printable, say, standard
 
@@ -170,9 +170,8 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
         name, chosen = standings.name, {"selection": standings.to_dict()}
     name, found = fitted(recording, name, arguments.projection, arguments.bounds)
     test = constant_velocity(recording, found)
-    document = documents.identification(
-        found, recording, notes, test, force_error(found.model, recording)
-    )
+    error = force_error(found.model, recording)
+    document = documents.identification(found, recording, notes, test, error)
     document |= {"name": name} | chosen
     if arguments.save or arguments.plot:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
@@ -240,8 +239,6 @@ def predict(arguments: Namespace) -> int:
 
     The force error is that of the rows in which the column `in_motion` is 1.
     """
-    from ..simulation.prediction import delay_of, in_motion, relative, residual
-
     model = _load(arguments.model)
     recording, notes = read(arguments.file, arguments)
     recording = _in_units(recording, model, arguments)

@@ -113,7 +113,7 @@ def _gathered(files, rows, of) -> list[tuple[str, _Values]]:
             if entry["value"] is not None and entry["standard_error"] is not None:
                 place = found.setdefault((of(file), name, entry["unit"]), [])
                 place.append((file, entry["value"], entry["standard_error"]))
-        if row.get(FORCE_ERROR):
+        if row[FORCE_ERROR]:
             found.setdefault((of(file), FORCE_ERROR, "1"), []).append((file, row[FORCE_ERROR], 0))
     return [
         (group, _Values(name, unit, [e[0] for e in entries], *_arrays(entries)))

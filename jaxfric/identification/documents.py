@@ -27,8 +27,9 @@ def identification(
 
     **Arguments:** `recording` that it was identified from, with the `notes` of its reader, so that
     its facts are told as well; its constant-velocity `test`, which may warn; `force_error` of
-    `predict` with the model, null where it was not computed. The `filtered_force_error` is that of
-    the rows, through the weak form's kernel of `filter_half_width` seconds.
+    `predict` with the model and the recording, for what was identified through the kernel that is
+    chosen from the recording: then `filter_half_width`, s, is that kernel's, through which the rows
+    of `filtered_force_error` went. Both are null where it was not computed.
     """
     parameters = {
         name: {
@@ -55,7 +56,9 @@ def identification(
         "diagnosis": found.diagnosis,
         "force_error": force_error,
         "filtered_force_error": float(found.filtered_force_error),
-        "filter_half_width": None if recording is None else _half_width(recording),
+        "filter_half_width": None
+        if force_error is None or recording is None
+        else _half_width(recording),
         "warnings": [remark.to_dict() for remark in remarks],
         "versions": versions(),
     }
@@ -65,7 +68,7 @@ def identification(
 
 
 def _half_width(recording: Recording) -> float:
-    """Half the width of the kernel that the weak form's rows have by default, s."""
+    """Half the width of the kernel that is chosen from a recording, s."""
     prepared = prepare(uniform(recording))
     return kernel_half_width(prepared) * float(interval(prepared))
 
