@@ -331,11 +331,21 @@ def names() -> tuple[str, ...]:
 
 def named(name: str) -> Sum:
     """The model of that name; raises `ValueError`, with the names there are, for another."""
-    stem = name.removeprefix("symmetric-").replace("_", "-")
-    if stem not in NAMED:
+    known = listed_as(name)
+    stem = known.removeprefix("symmetric-")
+    return symmetric(NAMED[stem]()) if known != stem else NAMED[stem]()
+
+
+def listed_as(name: str) -> str:
+    """A model's name as [`names`][] lists it: also `coulomb_viscous`, as its function is called.
+
+    **Raises:** `ValueError`, with the names there are, for another.
+    """
+    known = name.replace("_", "-")
+    if known not in names():
         near = meant(name, names())
         raise ValueError(f"No model is called {name!r}; there are {', '.join(names())}.{near}")
-    return symmetric(NAMED[stem]()) if name.startswith("symmetric-") else NAMED[stem]()
+    return known
 
 
 def load(text: str) -> Model:

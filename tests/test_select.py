@@ -82,3 +82,14 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert document["name"] == "gaussian" and len(document["selection"]["candidates"]) == 10
     assert main(["select", str(tmp_path / "none.csv")]) == 2
     assert "jaxfric select" in capsys.readouterr().err
+
+
+def test_a_model_may_be_spelled_as_its_function():
+    recording = jf.scenario.record(jf.scenario.machine(), force_noise=0.5, key=jax.random.key(0))
+    spelled = jf.select(recording, ["coulomb_viscous", "lorentzian"])
+    assert {one.name for one in spelled.candidates} == {"coulomb-viscous", "lorentzian"}
+    shown = repr(spelled)
+    assert shown.splitlines()[0].split()[:2] == ["model", "parameters"] and "lorentzian" in shown
+    assert "<table" in spelled._repr_html_()
+    with pytest.raises(ValueError, match="No model is called 'coulomb_viscos'"):
+        jf.select(recording, ["coulomb_viscos"])

@@ -41,7 +41,7 @@ def read(
     """Read one log: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`, or a robot's bag (rosbag2, MCAP).
 
     What was put in order on the way (interruptions, invalid samples, a wrapped position) is told
-    by [`read_with_notes`][], with what each repair changed and by how much.
+    by `jaxfric.data.io.read_with_notes`, with what each repair changed and by how much.
 
     **Arguments:**
 

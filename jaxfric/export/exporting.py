@@ -24,10 +24,10 @@ def export(
 ) -> Exported:
     """The model as text for another program, with the force error that the form costs.
 
-    **Arguments:** `target`, one of [`TARGETS`][]; `name`, of the functions, block or joint;
-    `speed` and `position`, the ranges (lowest, highest), m/s and m, that mujoco, urdf and table
-    are fitted and counted over, by default those that the model's parameters suggest
-    ([`cost.speed_range`][], [`cost.natural`][]).
+    **Arguments:** `target`, one of `jaxfric.export.TARGETS`; `name`, of the functions, block or
+    joint; `speed` and `position`, the ranges (lowest, highest), m/s and m, that mujoco, urdf and
+    table are fitted and counted over, by default those that the model's parameters suggest
+    (`export/cost.py`).
 
     **Raises:** `ValueError` for an unknown target, a term that it cannot express (mujoco and urdf
     leave such terms out instead and count them), a range that is none, or a model that is not

@@ -16,6 +16,7 @@ import numpy as np
 from .. import signals
 from ..checks import Remark
 from ..data.recording import Recording, require
+from ..looks import text
 from ..models import Model
 from ..signals import polynomial
 from ..units import VELOCITY, spell
@@ -90,6 +91,16 @@ class ConstantVelocity(NamedTuple):
             "points": [point._asdict() for point in self.points],
             "not_evaluated": [gap._asdict() for gap in self.not_evaluated],
         }
+
+    def __repr__(self) -> str:
+        rows = [["velocity", "force", "± 95 %", "curve", "seconds", ""]]
+        for p in self.points:
+            numbers = [p.velocity, p.force, 0.5 * (p.high - p.low), p.curve, p.seconds]
+            rows.append([*map("{:.4g}".format, numbers), "contradicts" * p.contradicts])
+        gaps = [f"{g.low:.3g} to {g.high:.3g}: {g.reason}" for g in self.not_evaluated]
+        return text.text(
+            [text.Table(rows, (0, 1, 2, 3, 4)), ["Not evaluated:", *gaps][: 9 * any(gaps)]]
+        )
 
 
 def constant_velocity(recording: Recording, found: Any = None) -> ConstantVelocity:

@@ -69,6 +69,19 @@ class Presliding(NamedTuple):
         }
         return told | {"distance": self.distance, "seconds": self.seconds, "why": self.why}
 
+    def __repr__(self) -> str:
+        if self.stiffness is None:
+            return f"No bristles identified: {self.why}."
+        known = {"stiffness": self.stiffness, "damping": self.damping}
+        said = [
+            f"{name} {float(e.value):.4g} {e.unit} ± {float(e.interval()[1] - e.value):.2g} (95 %)"
+            for name, e in known.items()
+            if e is not None
+        ]
+        return "\n".join(
+            [f"bristles over {self.seconds:.3g} s of presliding", *said, self.why]
+        ).strip()
+
 
 class _Rows(NamedTuple):
     """What does not depend on the bristles: the recording, the kernel and its places."""

@@ -280,8 +280,8 @@ def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int
 class WeakForm(AbstractProjection):
     """Everything through one kernel (1 − τ²)⁴, slid along the record by half its half-width.
 
-    **Arguments:** `half_width`, in samples; see [`kernel_half_width`][] for the default.
-    Kernels not wholly inside slip of one direction are left out, since there friction jumps.
+    **Arguments:** `half_width`, in samples; by default
+    [`kernel_half_width`][jaxfric.signals.kernel_half_width] of the recording. Kernels not wholly inside slip of one direction are left out, since there friction jumps.
     """
 
     half_width: int = eqx.field(static=True)

@@ -10,10 +10,11 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording, require, require_force
-from ..models import Model, named, names, weighed
+from ..looks import html, text
+from ..models import Model, listed_as, names, weighed
 from ..terms.base import AbstractTerm
 from ..units import VELOCITY, spell
-from . import standings
+from . import standings, tabulate
 from .identifying import identify
 from .projections import WeakForm
 from .uncertainty import student_quantile
@@ -54,6 +55,12 @@ class Selection(NamedTuple):
         return {"model": self.name, "candidates": rows, "tied": list(self.tied),
                 "reason": self.reason}  # fmt: skip
 
+    def __repr__(self) -> str:
+        return text.text(tabulate.standings(self.to_dict()))
+
+    def _repr_html_(self) -> str:
+        return html.html(tabulate.standings(self.to_dict()))
+
 
 def select(
     recording: Recording,
@@ -86,8 +93,8 @@ def select(
             _standing(name, term, prepared, width, fold, folds) for name, term in candidates.items()
         ]
         return _chosen(found)
-    for name in candidates:
-        named(name)  # raises for one there is not
+    some = (candidates,) if isinstance(candidates, str) else candidates
+    candidates = tuple(dict.fromkeys(map(listed_as, some)))
     together, log = standings.all_of(prepared, _stretches(prepared, folds), candidates, folds)
     found = []
     for name, one in together.items():

@@ -237,7 +237,8 @@ def explained(document: Mapping[str, Any]) -> list[Block]:
     """The paragraphs and tables of [`explanation`][]."""
     facts = document["recording"]
     file = printable(facts["file"])
-    source = [f"{file}: {facts['samples']} samples, {facts['duration']:.4g} s"]
+    whose = f"{file}: " if file else ""  # made in Python, and not named
+    source = [f"{whose}{facts['samples']} samples, {facts['duration']:.4g} s"]
     source += [f"  {note}" for note in facts.get("notes", [])]
     said = [f"{document['verdict']}: {document['summary']}", *warnings(document)]
     motion = document["fit"].get("simulation_error")

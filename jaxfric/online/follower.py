@@ -35,7 +35,7 @@ class Follower:
     """Friction followed sample by sample: constant memory and time, no acceleration, no mass.
 
     The arithmetic is that of [`update`][jaxfric.online.update], in plain Python, which is quicker
-    one sample at a time. After [`SETTLED`][] strokes of each direction the curve identified so far
+    one sample at a time. After `SETTLED` strokes of each direction the curve identified so far
     becomes the reference of the charts; a change forgets nearly all and begins anew.
 
     **Arguments:** `model`, a name or a sum of functions of velocity; `slowest`, `fastest`, `keep`,

@@ -41,7 +41,7 @@ class State(NamedTuple):
     """All that is kept of a stream; a pytree of arrays of fixed shape.
 
     - `nodes`: speeds, m/s, `(K,)`, rising geometrically from the slowest slip.
-    - `total`: the [`Sums`][] of closed strokes in each direction, `(2, K)`, forward first.
+    - `total`: the `Sums` of closed strokes in each direction, `(2, K)`, forward first.
     - `stroke`: those of the stroke under way; `inside`: whether its beginning was seen, `(2,)`.
     - `ring`: the last strokes of each direction where a window forgets, `(2, n, K)`; else `n` = 0.
     - `strokes`: closed strokes, `(2,)`; `usual`: their mean duration, s, `(2,)`.

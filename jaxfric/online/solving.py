@@ -50,7 +50,7 @@ def friction_only(model: AbstractTerm | Model | str) -> AbstractTerm:
 def solve(term: AbstractTerm, state: State) -> Solution:
     """The parameters of a sum of functions of velocity from a state: grid, refinement, α (17).
 
-    **Arguments:** `term` from [`friction_only`][]. Pure; parameters of a direction without a closed
+    **Arguments:** `term` from `friction_only`. Pure; parameters of a direction without a closed
     stroke are zero.
     """
     weight, load = state.total.weight, state.total.load

@@ -149,5 +149,8 @@ def derived(recording: Recording):
 
 
 def mujoco(model: str | Path, joint: str | None = None) -> Mujoco:
-    """A MuJoCo model (MJCF or URDF) as a baseline of `explain`; see [`Mujoco`][]."""
+    """A MuJoCo model (MJCF or URDF) as a baseline of `explain`.
+
+    See [`Mujoco`][jaxfric.simulators.Mujoco].
+    """
     return Mujoco(model, joint)

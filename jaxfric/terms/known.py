@@ -75,7 +75,7 @@ class KnownColumns(AbstractLaw):
     """What a simulator's own parameters add where they are others: u = Σ Δθ_i ∂f_known/∂θ_i.
 
     **Arguments:** `names` of the parameters, and their units as they are `spelled`. Recordings
-    bring the derivatives as the channels of [`channels_of`][], in two parts as the force.
+    bring the derivatives as the channels of `channels_of`, in two parts as the force.
     """
 
     names: tuple[str, ...] = eqx.field(static=True, converter=tuple)

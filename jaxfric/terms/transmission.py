@@ -44,7 +44,7 @@ def _gap_bounds(scales):
 class Backlash(AbstractMemory):
     """Load that rests while the motor crosses a gap: u = f − F_L sign(v) (1 − (w/δ)⁸).
 
-    w is the place in the gap from −δ to δ ([`play`][]), so the bracket is one inside and zero at
+    w is the place in the gap from −δ to δ (`play`), so the bracket is one inside and zero at
     the flanks; `half_gap` δ, m. First order: the load's friction F_L is absent, while its inertia,
     the impact and the ringing after it, which take a second mass, are left out.
     """
@@ -81,7 +81,7 @@ _OCTAVES = Resolution(0, 1, None, 12)
 class ElasticBacklash(AbstractMemory):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
-    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by ([`pushed`][]).
+    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`pushed`).
     `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
     is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
     """
@@ -276,7 +276,7 @@ _DRY = Resolution(0, 4, None, 32)
 class DryCompliance(AbstractMemory):
     """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
 
-    M_L p is what the spring pushes the load by ([`pushed`][]): [`Compliance`][] for a load whose
+    M_L p is what the spring pushes the load by (`pushed`): [`Compliance`][] for a load whose
     friction lets it stick, M_L d of it. `load_inertia` M_L, kg; `load_resonance` ω/2π, Hz;
     `damping_ratio` ζ; `load_deceleration` d, m/s².
     """
