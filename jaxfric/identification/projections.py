@@ -281,7 +281,8 @@ class WeakForm(AbstractProjection):
     """Everything through one kernel (1 − τ²)⁴, slid along the record by half its half-width.
 
     **Arguments:** `half_width`, in samples; by default
-    [`kernel_half_width`][jaxfric.signals.kernel_half_width] of the recording. Kernels not wholly inside slip of one direction are left out, since there friction jumps.
+    [`kernel_half_width`][jaxfric.signals.kernel_half_width] of the recording.
+    Kernels not wholly inside slip of one direction are left out, since there friction jumps.
     """
 
     half_width: int = eqx.field(static=True)

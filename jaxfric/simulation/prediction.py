@@ -24,8 +24,8 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     chosen from the noise of the position (of the velocity where there is no position). Pure: may
     stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
     to break-away, the value is that of the terms at rest. A
-    [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to first order. NaN where a parameter counts that the
-    model has no value for.
+    [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
+    first order. NaN where a parameter counts that the model has no value for.
     """
     require_model(model, "predict")
     require(recording, "predict")
