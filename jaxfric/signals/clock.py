@@ -10,7 +10,7 @@ from ..data.recording import Recording
 # An interval this many times the typical one is an interruption, not jitter of the clock.
 GAP_FACTOR = 5.0
 # Sorting takes n log n steps one by one, counting 63 n that the processor takes eight at a time.
-SORTED = 8192
+SORTED = 512
 
 
 def is_traced(recording: Recording) -> bool:
