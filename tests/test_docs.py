@@ -17,6 +17,12 @@ PAGES = Path(__file__).parents[1] / "docs" / "pages"
 BLOCK = re.compile(r"^```python exec=\"on\"[^\n]*\n(.*?)^```$", re.M | re.S)
 
 
+@pytest.fixture(autouse=True)
+def beside_the_pages(monkeypatch):
+    """As docs/hooks.py has it."""
+    monkeypatch.syspath_prepend(PAGES.parent)
+
+
 def blocks(page):
     return BLOCK.findall((PAGES / page).read_text("utf-8"))
 

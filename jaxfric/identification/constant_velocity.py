@@ -93,14 +93,14 @@ class ConstantVelocity(NamedTuple):
         }
 
     def __repr__(self) -> str:
-        rows = [["velocity", "force", "± 95 %", "curve", "seconds", ""]]
+        table = [["velocity", "force", "± 95 %", "curve", "seconds", ""]]
         for p in self.points:
-            numbers = [p.velocity, p.force, 0.5 * (p.high - p.low), p.curve, p.seconds]
-            rows.append([*map("{:.4g}".format, numbers), "contradicts" * p.contradicts])
-        gaps = [f"{g.low:.3g} to {g.high:.3g}: {g.reason}" for g in self.not_evaluated]
-        return text.text(
-            [text.Table(rows, (0, 1, 2, 3, 4)), ["Not evaluated:", *gaps][: 9 * any(gaps)]]
-        )
+            numbers = (p.velocity, p.force, 0.5 * (p.high - p.low), p.curve, p.seconds)
+            table.append([*map("{:.4g}".format, numbers), "contradicts" if p.contradicts else ""])
+        gaps = [
+            f"not evaluated {g.low:.3g} to {g.high:.3g}: {g.reason}" for g in self.not_evaluated
+        ]
+        return text.text([text.Table(table, range(5)), gaps])
 
 
 def constant_velocity(recording: Recording, found: Any = None) -> ConstantVelocity:

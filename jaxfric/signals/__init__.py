@@ -2,7 +2,6 @@
 
 from .clock import (
     GAP_FACTOR as GAP_FACTOR,
-    SORTED as SORTED,
     continuous as continuous,
     host_continuous as host_continuous,
     host_interval as host_interval,
