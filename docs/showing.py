@@ -1,4 +1,4 @@
-"""Pictures on the pages that run: `show(axes)` in a block draws what `plot` returned below it."""
+"""Pictures on the pages that run: `print(picture(axes))` in a block shows what `plot` returned."""
 
 import base64
 import io
@@ -8,9 +8,9 @@ import matplotlib
 matplotlib.use("agg")
 
 
-def show(axes) -> None:
-    """Print the figure of one or several axes as an image in Markdown."""
+def picture(axes) -> str:
+    """The figure of one or several axes as an image in Markdown; only a page's own `print` shows."""
     figure = getattr(axes, "figure", None) or axes[0].figure
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight")
-    print(f"![](data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()})")
+    return f"![](data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()})"
