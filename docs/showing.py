@@ -9,7 +9,7 @@ matplotlib.use("agg")
 
 
 def picture(axes) -> str:
-    """The figure of one or several axes as an image in Markdown; only a page's own `print` shows."""
+    """The figure of one or several axes as an image in Markdown; a page's own `print` shows it."""
     figure = getattr(axes, "figure", None) or axes[0].figure
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight")

@@ -1,6 +1,6 @@
 """The documentation names what there is, and its pages run."""
 
-import contextlib
+import functools
 import io
 import re
 import types
@@ -32,8 +32,10 @@ def run(page):
     session, said = {"__name__": "page"}, []
     with jax.numpy_dtype_promotion("standard"), jax.numpy_rank_promotion("allow"):
         for block in blocks(page):
-            with contextlib.redirect_stdout(io.StringIO()) as out:
-                exec(compile(block, page, "exec"), session)
+            # As the site has it: what a block prints itself, not what it calls.
+            out = io.StringIO()
+            session["print"] = functools.partial(print, file=out)
+            exec(compile(block, page, "exec"), session)
             said.append(out.getvalue())
     return session, said
 
