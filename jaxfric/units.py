@@ -32,6 +32,9 @@ SI = {"force": "N", "position": "m"}
 _ROTARY_FORCES = ("N·m", "N*m", "Nm")
 
 
+TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
+"""What angles count a revolution as."""
+
 # What one of a unit is in the first unit of its kind.
 _KINDS: tuple[Mapping[str, float], ...] = (
     {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},

@@ -11,7 +11,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.terms.base import AbstractTerm
-from jaxfric.terms.catalogue import CATALOGUE
+from jaxfric.terms.effects import EFFECTS
 
 PAGES = Path(__file__).parents[1] / "docs" / "pages"
 BLOCK = re.compile(r"^```python exec=\"on\"[^\n]*\n(.*?)^```$", re.M | re.S)
@@ -73,7 +73,7 @@ def test_the_reference_shows_every_command_and_every_effect():
         assert f"## jaxfric {name}\n\n```text\nusage: jaxfric {name}" in said
     assert {"identify", "explain", "fleet", "watch"} <= set(session["names"])
     (said,) = run("reference/effects.md")[1]
-    assert all(f"## {effect.name.replace('_', ' ')}\n" in said for effect in CATALOGUE)
+    assert all(f"## {effect.name.replace('_', ' ')}\n" in said for effect in EFFECTS.values())
 
 
 @pytest.mark.slow

@@ -260,18 +260,18 @@ def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
     run = jax.tree.map(lambda x: x[:-12], run)
     asked = question.ask(run, None, models.named("gaussian"))
     undoing = timing._Undoing(run, asked, asked.base)
-    delay = timing.WAYS["transport_delay"]
+    delay = EFFECTS["transport_delay"].undone
     found = [undoing.least(delay, guess) for guess in (3e-3, 9.5e-3, 30e-3)]
     times = [time for _, time in found]
     np.testing.assert_allclose(times, times[1], rtol=2 * timing.CLOSE)
     assert times[1] == pytest.approx(10e-3, abs=1.1e-3)
-    assert found[0][0] < 0.5 * undoing.least(timing.WAYS["actuator_lag"], 9.5e-3)[0]
+    assert found[0][0] < 0.5 * undoing.least(EFFECTS["actuator_lag"].undone, 9.5e-3)[0]
 
 
 def test_of_the_rest_only_noise_is_made_up_for_what_undoing_a_lag_takes_of_it(healthy):
     asked = question.ask(healthy[0], None, models.named("gaussian"))
     undoing = timing._Undoing(healthy[0], asked, asked.base)
-    lag, width, time = timing.WAYS["actuator_lag"], asked.evidence.width, 8e-3
+    lag, width, time = EFFECTS["actuator_lag"].undone, asked.evidence.width, 8e-3
     taken = undoing.hiss(timing._as_it_is, 0.0, width) / undoing.hiss(lag, time, width)
     sizes = []
     for undoing.power in (0.0, np.inf):

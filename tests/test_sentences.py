@@ -8,6 +8,7 @@ import pytest
 from jaxfric.explanation.quantities import nil, quantity, turns
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
+from jaxfric.terms.effect import Extent
 
 
 def estimate(value, error, unit):
@@ -57,9 +58,9 @@ def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
         "amplitude": estimate(0.99, 0.1, "N"),
         "friction_period": estimate(0.43, 0.22, "m"),
     }
-    told = sentence("position_dependent_friction", values, 0.14, (), 0.25)
+    told = sentence("position_dependent_friction", values, 0.14, (), Extent(0.0, 0.25))
     assert "varies slowly along the stroke, by 0.99 N" in told and "0.43" not in told
-    told = sentence("position_dependent_friction", values, 0.14, (), 2.0)
+    told = sentence("position_dependent_friction", values, 0.14, (), Extent(0.0, 2.0))
     assert "with a period of 0.43 m" in told
 
 
@@ -68,9 +69,9 @@ def test_a_stop_over_much_of_the_stroke_is_too_soft_for_one(reach, soft):
     values = {
         "lower_stop_position": estimate(0.095, 0.02, "m"),
         "lower_stop_stiffness": estimate(9.7, 2.0, "N/m"),
-        "stop_reach": estimate(reach, 0.0, "m"),
     }
-    told = sentence("end_stop", values, 0.09, (), 0.25)
+    low = 0.095 - reach
+    told = sentence("end_stop", values, 0.09, (), Extent(low, low + 0.25))
     assert ("too soft for an end stop" in told) == soft
     assert ("an elastic end stop" in told) != soft
 

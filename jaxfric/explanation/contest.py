@@ -1,14 +1,16 @@
 """One round of the contest: every candidate on the grid, the best refined with the whole model."""
 
-from typing import NamedTuple
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..terms import Cogging, DisturbancePulses
-from .candidates import Candidate, Field, at_tones, scaled
+from ..terms.effect import Effect
+from .candidates import Candidate, Field, at_frequencies, scaled, tones
 from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
-from .pulses import pulses
+from .outstanding import outstanding
 from .regression import Fit, fit
 from .threads import each
 from .tones import fast_tone
@@ -16,9 +18,6 @@ from .tones import fast_tone
 # A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
 # 1995 call ten on twice this scale very strong).
 RIVAL = 5.0
-# Effects whose columns hold a derivative of the acceleration: what the encoder's noise makes of
-# that is the same noise that the controller answered, so that it explains force without physics.
-SHARP = frozenset({"transport_delay", "actuator_lag", "compliance", "frictional_lag"})
 # Candidates refined beyond the grid: refining gains little over neighbouring grid points.
 FINALISTS = 8
 
@@ -43,12 +42,9 @@ class Trial(NamedTuple):
     def score(self, gain: float, size: float) -> float:
         """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978).
 
-        The moments of pushes, and their width, were looked for like any other parameter.
+        What the residual has suggested, the moments of pushes, was looked for like a parameter.
         """
-        term = self.candidate.term
-        price = self.dimension + len(self.beta)
-        if isinstance(term, DisturbancePulses):
-            price += len(term.times) + 1
+        price = self.dimension + len(self.beta) + self.candidate.term.chosen
         return -0.5 * size * np.log1p(-min(gain, 1 - 1e-12)) - 0.5 * price * np.log(max(size, 2))
 
 
@@ -82,11 +78,11 @@ def contest(
     now: Fit,
     field: Field,
     seed: int = 0,
-    among: frozenset[str] = frozenset(),
+    among: Callable[[Effect], bool] = lambda effect: True,
 ) -> Contest:
     """Let every candidate compete for the residual of a fit; `evidence` with its predictions.
 
-    `among`: effects of which alone there are finalists; all of them where it is empty.
+    `among`: whether an effect may be among the finalists.
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
@@ -107,8 +103,9 @@ def contest(
             field.candidates, best, scans, p_values, least, strict=True
         )
     ]
-    known = any(isinstance(term, DisturbancePulses) for term in now.terms)
-    for candidate in [*([] if known else pulses(seen, now)), *at_tones(fast_tone(seen, now))]:
+    fast = fast_tone(seen, now)
+    loud = [c for effect, term in tones(seen) for c in at_frequencies(effect, term, fast)]
+    for candidate in [*outstanding(seen, now), *loud]:
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events, nor about a line among thousands: what
         # stands out has been tested.
@@ -118,7 +115,7 @@ def contest(
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.chance for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
-    asked = [t for t in trials if not among or t.candidate.effect.name in among]
+    asked = [t for t in trials if among(t.candidate.effect)]
     return Contest(trials, _finals(seen, now, asked, size), size)
 
 
@@ -136,7 +133,7 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
     basis = now.basis()
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     # A sharp term may not be confirmed, and must not keep the next best from being looked at.
-    blunt = [t for t in trials if t.candidate.effect.name not in SHARP]
+    blunt = [t for t in trials if not t.candidate.effect.sharp]
     leader = (blunt or trials)[0]
     enough = 0.5 * leader.score(leader.gain, size) - RIVAL
 
@@ -184,7 +181,9 @@ def _overtone(trial: Trial, found: Finalist) -> Trial:
     candidate = trial.candidate
     beta = found.betas[-1] / (1 + int(np.argmax(size)))
     lines = candidate.lines._replace(harmonics=1)
-    alone = candidate._replace(term=Cogging(harmonics=1), betas=beta[None], lines=lines)
+    several: Any = candidate.term
+    term = dataclasses.replace(several, harmonics=1)
+    alone = candidate._replace(term=term, betas=beta[None], lines=lines)
     return trial._replace(candidate=alone, beta=beta, dimension=2, p_value=1.0)
 
 

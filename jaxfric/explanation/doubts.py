@@ -58,7 +58,7 @@ def _friction(now: Fit) -> list[int]:
     places, start = list[int](), 0
     leaves = (leaf for term in now.terms for leaf in summands(term))
     for leaf in leaves:
-        if leaf.coordinates <= {"velocity"} and not isinstance(leaf, laws.Offset | laws.Inertia):
+        if leaf.coordinates == {"velocity"}:
             places += range(start, start + len(leaf.affine))
         start += len(leaf.affine)
     return places

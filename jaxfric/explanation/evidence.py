@@ -20,14 +20,7 @@ import numpy as np
 
 from .. import programs, signals
 from ..data.recording import Recording, pad
-from ..terms import (
-    KNOWN,
-    KNOWN_FORCE,
-    KNOWN_MOMENTUM,
-    KNOWN_REST,
-    DryCompliance,
-    ElasticBacklash,
-)
+from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -88,7 +81,7 @@ class Evidence(NamedTuple):
         if not len(term.affine):
             return np.zeros((len(betas), len(self.target), 0))
         parts = []
-        most = STEPPED if isinstance(term, DryCompliance | ElasticBacklash) else BATCH
+        most = STEPPED if term.stepped else BATCH
         for start in range(0, len(betas), most):
             some = betas[start : start + most]
             size = PAIR if len(some) <= PAIR else most

@@ -16,10 +16,10 @@ from ..simulation.prediction import outliers, unseen
 from ..simulators import AbstractSimulator, Known, same_motion
 from ..terms import KNOWN, KNOWN_FORCE
 from ..terms.base import AbstractTerm
+from ..terms.effects import traits
 from . import parameters as spelled, threads, verification
 from .attributes import in_own_words
 from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
-from .candidates import OF_THE_MOMENT
 from .contest import Contest, contest
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
@@ -32,7 +32,7 @@ from .predictions import with_predictions
 from .question import ALIGNED, Question, ask, opened
 from .regression import Fit
 from .telling import facts, tell
-from .timing import LATE, late, overlooked, settled
+from .timing import late, overlooked, settled
 from .views import weightless
 
 
@@ -263,7 +263,7 @@ def _with_the_force_put_back(
     the force acts late it is put back, and the search is done once more.
     """
     lateness = None
-    if any(isinstance(term, LATE) for term in found.last.terms):
+    if any(traits(term).late for term in found.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
         lateness = late(recording, asked.within or asked, found.start or found)
     sure = lateness is not None
@@ -433,8 +433,7 @@ def _helpful(found: Named, asked: Question) -> Named:
 
 def _lasting(found: Named) -> list[int]:
     """Numbers of the findings that another recording has to show too."""
-    names = [taken.trial.candidate.effect.name for taken in found.taken]
-    return [number for number, name in enumerate(names) if name not in OF_THE_MOMENT]
+    return [i for i, t in enumerate(found.taken) if not t.trial.candidate.effect.momentary]
 
 
 def _lacking(found: Named, evidence, number: int) -> Named:

@@ -13,7 +13,6 @@ from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fit
-from .timing import LATE
 
 # The question where what the findings leave is judged, and the findings there.
 Rest = tuple[Question, Named]
@@ -151,7 +150,6 @@ def _lacking(found: Named, rest: Rest, asked: Question, number: int) -> tuple[Na
         return less, (asked, less)
     left = _less(left, where, number)
     late = found.last.terms[-1]
-    assert isinstance(late, LATE)
     beta, alpha = found.last.betas[-1], found.last.alphas[-1]
     seen = with_predictions(asked.evidence, left.last)
     now = fit((*left.last.terms, late), seen, [*left.last.betas, beta], 0)

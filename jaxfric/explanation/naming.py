@@ -8,11 +8,10 @@ import jax
 import numpy as np
 
 from ..models import Model
-from ..terms import Compliance, DryCompliance, ElasticBacklash
-from ..terms.catalogue import Effect
-from .candidates import OF_THE_MOMENT, Candidate, Field
+from ..terms.effect import Effect
+from .candidates import Candidate, Field
 from .chance import DRAWS, LEVEL
-from .contest import RIVAL, SHARP, Contest, Finalist, Trial, contest
+from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .plausible import machines
 from .predictions import with_predictions
@@ -101,17 +100,17 @@ def search(
     asked of a later term, if another than usual.
     """
     part = part or (MOST_JUDGED if judged else MOST)
-    now, taken, among, kept = base, list[Taken](), frozenset[str](), 0
+    now, taken, kept = base, list[Taken](), 0
     evidence = with_predictions(evidence, now)
     if start is not None:
         # The base would bend its curve to what acts at reversals; without them it did not.
         now, taken = _elsewhere(start, refuted)
         now = fit(now.terms, with_predictions(evidence, now), now.betas, 0)
         evidence = with_predictions(evidence, now)
-        among, kept = AT_REVERSALS, len(taken)
+        kept = len(taken)
     visited: set[tuple[str, ...]] = set()
     while True:
-        round_ = contest(evidence, now, field, seed, among)
+        round_ = contest(evidence, now, field, seed, lambda e: start is None or e.at_reversals)
         open_ = [f for f in round_.finalists if not marks(f.trial.candidate) & refuted]
         round_ = machines(round_._replace(finalists=open_), now, evidence)
         best = _believed(round_, now, evidence, wider, base, taken, judged, part)
@@ -149,12 +148,12 @@ def _plainer(best: Finalist, round_: Contest) -> Finalist:
     """The best, or an idealisation of the same with fewer parameters that does nearly as well."""
 
     def meant(other: Finalist) -> bool:
-        name = other.trial.candidate.effect.name
-        known = name in AT_REVERSALS and name not in SHARP and other.p_value <= LEVEL
+        effect = other.trial.candidate.effect
+        known = effect.at_reversals and not effect.sharp and other.p_value <= LEVEL
         fewer = len(other.betas[-1]) < len(best.betas[-1])
         return known and fewer and other.score >= NO_EVIDENCE * best.score
 
-    if best.trial.candidate.effect.name not in AT_REVERSALS:
+    if not best.trial.candidate.effect.at_reversals:
         return best
     return next((other for other in round_.finalists if meant(other)), best)
 
@@ -193,11 +192,18 @@ def _rivals(
             alike.append((other, same))
     names = [f.trial.candidate.effect.name for f, _ in alike]
     own = best.trial.candidate.effect.name
-    twin = [f for f, same in alike if same and f.trial.candidate.effect.name == "cogging"]
-    if own == "periodic_disturbance" and twin and twin[0].p_value <= LEVEL:
+    twin = [f for f, same in alike if same and _line(f, "position")]
+    if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
         best = twin[0]
-        names = [own, *(name for name in names if name != "cogging")]
+        instead = best.trial.candidate.effect.name
+        names = [own, *(name for name in names if name != instead)]
     return best, tuple(dict.fromkeys(names))
+
+
+def _line(finalist: Finalist, coordinate: str) -> bool:
+    """Whether it is a wave over a coordinate alone."""
+    lines = finalist.trial.candidate.lines
+    return lines is not None and lines.coordinate == coordinate and not lines.sided
 
 
 def _force(finalist: Finalist, evidence) -> np.ndarray:
@@ -218,17 +224,10 @@ RAREST = 1.5 / (1 + DRAWS)
 
 # Isolated pushes besides another effect are mostly where that effect switches, and terms on the
 # force's own derivatives take what a strong effect leaves through the kernel; a load behind a gap
-# is one of them, with three numbers of its own.
+# is one of them, with three numbers of its own: effects with the trait `leftover`.
 EASY_OF_BASE = 0.05
-EASY = frozenset(
-    {"transport_delay", "actuator_lag", "compliance", "backlash", "disturbance_pulses"}
-)
-# What time alone drives need not come again in another recording, and noise feeds terms on
-# derivatives there as well.
-UNJUDGED = EASY | SHARP | OF_THE_MOMENT
-# Each of these is an idealisation of what happens about a reversal (one spring, friction without a
-# dip on the load): half of its amplitude is no evidence for another of them, or for pushes there.
-AT_REVERSALS = frozenset({"presliding", "frictional_lag", "backlash", "compliance"})
+# Idealisations of what happens about a reversal (one spring, friction without a dip on the load):
+# half of the amplitude of one is no evidence for another of them, or for pushes there.
 REVERSAL_OF_BASE = 0.25
 # None of these floors is for what takes three quarters of what is left: what an idealisation leaves
 # is not of one law's shape; on machines with one effect a second name took two thirds at most.
@@ -245,21 +244,20 @@ def _believed(
         gained = now.energy - finalist.energy
         candidate = finalist.trial.candidate
         effect = candidate.effect
-        repeats = judged and effect.name not in UNJUDGED
+        # What time alone drives need not come again in another recording, and noise feeds terms on
+        # derivatives there as well.
+        repeats = judged and not (effect.leftover or effect.sharp or effect.momentary)
         floor = (LINEARITY_JUDGED if repeats else LINEARITY) ** 2 * force
         enough = gained >= max(max(least, candidate.least) * now.energy, floor)
-        if effect.name == "load_drift":
-            # Every axis has a load that wanders; no larger than the noise it is a part of it.
+        if effect.ubiquitous:
             enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
             enough &= gained >= least_gain(effect, before, base.energy, now.energy, part)
             enough &= not _again(finalist, taken)
-        sharp = effect.name in SHARP
-        dynamic = isinstance(candidate.term, ElasticBacklash)
-        level = RAREST if sharp else LEVEL
+        level = RAREST if effect.sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if (sharp or dynamic) and not _confirmed(finalist, now, wider, least):
+        if (effect.sharp or candidate.term.swings) and not _confirmed(finalist, now, wider, least):
             continue
         return finalist
     return None
@@ -279,18 +277,18 @@ def least_gain(
     left, and that they leave; `part` of the latter that is much;
     `floor`: the least part of the base's.
     """
-    again = any(earlier.name in AT_REVERSALS for earlier in before)
-    if again and (effect.name in AT_REVERSALS or effect.name == "disturbance_pulses"):
+    again = any(earlier.at_reversals for earlier in before)
+    if again and (effect.at_reversals or effect.isolated):
         return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
-    if effect.name in EASY:
+    if effect.leftover:
         return min(EASY_OF_BASE * base, NEARLY_ALL * left)
     return max(floor * base, min(OF_BASE * base, part * left))
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:
-    """Whether the effect has been taken already; of waves and end stops there may be several."""
+    """Whether the effect has been taken already; of waves there may be several."""
     own = finalist.trial.candidate
-    several = own.lines is not None or own.effect.name == "end_stop"
+    several = own.lines is not None or own.effect.several
     return not several and any(t.trial.candidate.effect.name == own.effect.name for t in taken)
 
 
@@ -306,9 +304,8 @@ def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool
     if wide is None or _alike(finalist, now, wide, 2.0, least):
         return True
     term = finalist.trial.candidate.term
-    swings = isinstance(term, Compliance | DryCompliance | ElasticBacklash)
     most = now.energy - finalist.energy >= MOST * now.energy
-    loud = swings and most and between is not None
+    loud = term.swings and most and between is not None
     return loud and _alike(finalist, now, between, BETWEEN, least)
 
 
@@ -338,8 +335,9 @@ def marks(candidate: Candidate) -> frozenset[Hashable]:
 
 def _elsewhere(found: Named, refuted: frozenset[Hashable]) -> tuple[Fit, list[Taken]]:
     """What was found but for what acts at reversals or is out of question."""
-    gone, start = AT_REVERSALS | refuted, len(found.last.terms) - len(found.taken)
-    kept = [i for i, t in enumerate(found.taken) if not marks(t.trial.candidate) & gone]
+    start = len(found.last.terms) - len(found.taken)
+    mine = [t.trial.candidate for t in found.taken]
+    kept = [i for i, c in enumerate(mine) if not (c.effect.at_reversals or marks(c) & refuted)]
     last = found.last.only([*range(start), *(start + i for i in kept)])
     return last, [found.taken[i] for i in kept]
 

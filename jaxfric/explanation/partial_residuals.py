@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..terms.effects import EFFECTS
-from ..terms.time import PeriodicDisturbance
 from . import verification
 from .baseline import Mismatch
 from .bins import Axis, Bins, axis
@@ -114,9 +113,6 @@ def _along(effect: str, now: Fit, place: int, seen: Evidence) -> Axis:
 
 def _period(term, beta) -> float | None:
     """The period of a wave, in its coordinate; `None` for another term."""
-    for parameter, value in zip(term.nonlinear, beta, strict=True):
-        if parameter.name == "pitch" or parameter.name.endswith("_period"):
-            return float(value)
-        if isinstance(term, PeriodicDisturbance) and parameter.name == "frequency":
-            return 1 / float(value)
-    return None
+    pairs = zip(term.nonlinear, beta, strict=True)
+    periods = (parameter.period(float(value)) for parameter, value in pairs)
+    return next((period for period in periods if period is not None), None)

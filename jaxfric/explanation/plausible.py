@@ -2,17 +2,16 @@
 
 import numpy as np
 
-from .. import terms as laws
+from ..terms.base import leaves
 from ..terms.friction import AbstractBump
-from .candidates import leaves
+from ..terms.sample import Burden
 from .contest import Contest, Finalist
 from .evidence import Evidence
 from .regression import Fit, fit
 
-_LOADS = laws.Compliance | laws.DryCompliance | laws.ElasticBacklash
-# Of a load behind a gap the rows tell the friction well, and the inertia only by how it coasts;
-# where they ask for somewhat more of that than there is, they are asked about all there is.
-TRIES = 3
+# Where the rows tell an inertia badly and ask for somewhat more than there is, they are asked about
+# all there is; a hundredth less, not to be refused by rounding.
+TRIES, LIGHTER = 3, 1.01
 
 
 def machines(round_: Contest, now: Fit, evidence: Evidence) -> Contest:
@@ -31,17 +30,19 @@ def machines(round_: Contest, now: Fit, evidence: Evidence) -> Contest:
 
 
 def _lighter(finalist: Finalist, now: Fit, evidence: Evidence, size: float) -> Finalist | None:
-    """A load behind a gap with no more inertia than the machine has, its friction fitted again.
+    """A load with no more inertia than the machine has, its friction fitted again.
 
-    `None` for any other, and where it is the friction that is too much.
+    `None` where the rows tell the inertia, and where it is the friction that is too much.
     """
     trial = finalist.trial
-    if not isinstance(trial.candidate.term, laws.ElasticBacklash):
+    burden = trial.candidate.term.burden(finalist.betas[-1], finalist.alpha)
+    if burden is None or burden.lighter is None:
         return None
-    inertia, friction, most = _beside(finalist, now, evidence)
-    if friction > most["coulomb"] + most["stribeck_force"] or not 0 < most["inertia"] < inertia:
+    own, most = _beside(finalist, now, evidence)
+    too_much = own.friction > most["coulomb"] + most["stribeck_force"]
+    if too_much or not 0 < most["inertia"] < own.inertia:
         return None
-    beta = finalist.betas[-1] * np.array([1.0, 1.0, 1.01 * inertia / most["inertia"]])
+    beta = burden.lighter(LIGHTER * own.inertia / most["inertia"])
     there = fit([trial.candidate.term], evidence, [beta], 0, now.basis())
     gain = 1 - there.energy / now.energy
     return finalist._replace(
@@ -61,26 +62,24 @@ def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
     ground. What follows speed late is a part of the friction, by a Stribeck curve that is there in
     steady slip too.
     """
-    term = finalist.trial.candidate.term
-    if not isinstance(term, _LOADS | laws.FrictionalLag):
+    burden = finalist.trial.candidate.term.burden(finalist.betas[-1], finalist.alpha)
+    if burden is None:
         return True
     bumps = any(isinstance(leaf, AbstractBump) for t in now.terms for leaf in leaves(t))
-    if isinstance(term, laws.FrictionalLag) and not bumps:
+    if burden.curved and not bumps:
         return False
-    if isinstance(term, laws.DryCompliance):
-        resonance, _, slow = finalist.betas[-1]
-        give = slow / (2 * np.pi * resonance) ** 2
-        if give > 0.1 * (evidence.limits.high - evidence.limits.low):
-            return False
-    inertia, friction, most = _beside(finalist, now, evidence)
-    return inertia <= most["inertia"] and friction <= most["coulomb"] + most["stribeck_force"]
+    if burden.give and burden.give > 0.1 * (evidence.limits.high - evidence.limits.low):
+        return False
+    own, most = _beside(finalist, now, evidence)
+    enough = own.friction <= most["coulomb"] + most["stribeck_force"]
+    return own.inertia <= most["inertia"] and enough
 
 
-def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[float, float, dict]:
-    """Inertia, kg, and friction, N, of the load or the bump, and what the machine has of each."""
+def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[Burden, dict[str, float]]:
+    """What a term takes of the machine, beside all the others, and what the machine has of it."""
     term = finalist.trial.candidate.term
     both = fit((*now.terms, term), evidence, finalist.betas, 0)
-    inertia, friction = _parts(term, both.betas[-1], both.alphas[-1])
+    own = term.burden(both.betas[-1], both.alphas[-1])
     values = [
         (p.name.rstrip("+-"), float(a))
         for t, alpha in zip(both.terms[:-1], both.alphas, strict=False)
@@ -90,16 +89,4 @@ def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[float, fl
         name: max((a for n, a in values if n == name), default=default)
         for name, default in (("inertia", np.inf), ("coulomb", np.inf), ("stribeck_force", 0.0))
     }
-    return inertia, friction, most
-
-
-def _parts(term, beta, alpha) -> tuple[float, float]:
-    """Inertia, kg, and friction, N, of the load or the bump."""
-    if isinstance(term, laws.FrictionalLag):
-        return 0.0, float(alpha[0])
-    if isinstance(term, laws.ElasticBacklash):
-        return float(alpha[0] / beta[2]), float(alpha[0])
-    if isinstance(term, laws.DryCompliance):
-        return float(alpha[0]), float(alpha[0] * beta[2])
-    known = {p.name: float(a) for p, a in zip(term.affine, alpha, strict=True)}
-    return known.get("load_inertia", 0.0), known.get("load_friction", 0.0)
+    return own, most

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..terms import KNOWN_FORCE, ActuatorDeadband
+from ..terms import KNOWN_FORCE
+from ..terms.effects import traits
 from .evidence import NODES, PAIR, Evidence, evaluate
 from .regression import Fit
 
@@ -27,7 +28,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     force = force + rate(evidence, momentum)
     if KNOWN_FORCE in evidence.motion.channels:
         force = force + np.asarray(evidence.motion.channels[KNOWN_FORCE])
-    if any(isinstance(term, ActuatorDeadband) for term in fit.terms):
+    if any(traits(term).switches for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(
         predicted_force=force,

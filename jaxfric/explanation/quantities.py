@@ -3,6 +3,7 @@
 import math
 
 from ..identification.uncertainty import Estimate
+from ..units import TURNS
 
 # Smaller units, by the unit that a value is in; a value takes the first that makes it at least one.
 _SMALLER = {
@@ -14,8 +15,6 @@ _SMALLER = {
 }
 # Below this, a smaller unit is used.
 SMALL = 0.05
-# What angles count a revolution as.
-TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
 
 
 def quantity(estimate: Estimate) -> str:

@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import terms as laws
 from ..data.recording import Recording
+from ..terms.actuator import TransportDelay
 from ..terms.base import AbstractTerm
+from ..terms.effects import traits
 from .candidates import Field
 from .chance import blocks
 from .evidence import Evidence, gather
@@ -165,15 +166,12 @@ def _lateness(views: list[Evidence], known: Fit) -> float:
     two differ, since noise of the encoder moves the narrow one only.
     """
     sample, delays = views[0].limits.interval, []
-    kept = [i for i, term in enumerate(known.terms) if type(term) not in _SHARP_TERMS]
+    kept = [i for i, term in enumerate(known.terms) if not traits(term).delays]
     terms, betas = [known.terms[i] for i in kept], [known.betas[i] for i in kept]
     for evidence in views:
         seen = with_predictions(evidence, known)
         now = fit(terms, seen, betas, 6)
         seen = with_predictions(seen, now)
-        both = fit([*terms, laws.TransportDelay()], seen, [*now.betas, np.zeros(0)], 6)
+        both = fit([*terms, TransportDelay()], seen, [*now.betas, np.zeros(0)], 6)
         delays.append(float(both.alphas[-1][0]))
     return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
-
-
-_SHARP_TERMS = (laws.TransportDelay, laws.ActuatorLag, laws.Compliance, laws.DryCompliance)

@@ -8,11 +8,11 @@ import numpy as np
 from ..checks import MATTERS, Remark
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
+from ..terms.effect import Extent
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, freed
 from .bins import unit
-from .candidates import OF_THE_MOMENT
 from .chance import LEVEL
 from .curves import curves
 from .doubts import NOT_BETTER, accelerates, doubts, not_better
@@ -120,7 +120,8 @@ def _doubts(asked: Question, better: Improved, units) -> list[Remark]:
     remarks = doubts(left.last, where, values, better.after.filtered)
     if better.spoilt is not None:
         remark = not_better(better.gone, better.before, better.spoilt)
-        if FILTERED & set(better.gone) and asked.evidence.motion.position is None:
+        late = any(EFFECTS[name].late for name in better.gone)
+        if late and asked.evidence.motion.position is None:
             remark = remark._replace(text=f"{remark.text} {NO_POSITION}")
         remarks.append(remark)
     return remarks
@@ -254,7 +255,7 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
 
     much = [here]
     if held is not None:
-        momentary = [share for name, share in shares.items() if name in OF_THE_MOMENT]
+        momentary = [share for name, share in shares.items() if EFFECTS[name].momentary]
         excused = HALF_ROUGH**2 * (left(here) + sum(momentary)) if momentary else 0.0
         much += [held] if left(held) > excused else []
     # The findings go from the mismatch to the noise, and less than half the way (in decades).
@@ -285,8 +286,7 @@ def _verdict(findings: list[Finding], before, after, rough: bool, standing: bool
     return "unexplained" if before or rough else "consistent"
 
 
-# What a filter on the recorded velocity cannot be told from.
-FILTERED = frozenset({"transport_delay", "actuator_lag"})
+# What cannot be told from a force that acts late.
 NO_POSITION = (
     "No position is recorded: a filter on the recorded velocity looks like a delay or a lag, and "
     "recording the position tells."
@@ -300,21 +300,20 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> tuple[list[Fin
     findings, alone = [], []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
-        if "step_time" in parameters:
-            parameters = _dated(parameters, asked.evidence)
+        if effect.moment:
+            parameters = _dated(parameters, effect.moment, asked.evidence)
         share, held = _shares(found, asked, rest, first, number)
         alone.append(share)
         if twins := _twins(found, number):
             share, held = _shares(found, asked, _without(rest, twins), first, number)
         rivals = taken.rivals
-        told = parameters | _reach(parameters, asked.evidence)
-        text = sentence(effect.name, told, share, rivals, _stroke(asked.evidence))
+        text = sentence(effect.name, parameters, share, rivals, _extent(asked.evidence))
         if taken.rephased:
             text += (
                 " On the held-out recording it has the same period and amplitude at another "
                 "phase: the position's zero has moved, as after another homing."
             )
-        if effect.name in FILTERED and asked.evidence.motion.position is None:
+        if effect.late and asked.evidence.motion.position is None:
             text += f" {NO_POSITION}"
         findings.append(
             Finding(
@@ -352,25 +351,11 @@ def _without(rest: tuple[Question, Named], numbers: list[int]) -> tuple[Question
     return where, left
 
 
-def _stroke(evidence: Evidence) -> float:
-    """The range of the position."""
+def _extent(evidence: Evidence) -> Extent:
+    """The range of the position and the usual force."""
     limits = evidence.limits
-    return float(limits.high - limits.low)
-
-
-def _reach(parameters: Mapping[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
-    """How far the axis goes into a stop, and its force there in parts of the usual force."""
-    limits, found = evidence.limits, {}
-    for name, estimate in parameters.items():
-        if name.endswith("stop_position"):
-            lower = name.startswith("lower")
-            end = limits.low if lower else limits.high
-            far = abs(float(end) - float(estimate.value))
-            found["stop_reach"] = Estimate(np.float64(far), np.float64(0.0), estimate.unit)
-            stiffness = parameters[name.replace("position", "stiffness")].value
-            part = far * abs(float(stiffness)) / np.sqrt(np.mean(evidence.force**2))
-            found["stop_part"] = Estimate(np.float64(part), np.float64(0.0), "1")
-    return found
+    force = float(np.sqrt(np.mean(evidence.force**2)))
+    return Extent(float(limits.low), float(limits.high), force)
 
 
 def _shares(
@@ -387,7 +372,7 @@ def _shares(
     less = verification.lacking(named, with_predictions(place.evidence, named.last), number)
     # No more than the base leaves, which refitting in a few steps may miss.
     share = float((min(less.energy, named.base.energy) - left.last.energy) / first.energy)
-    if asked.held is None or found.taken[number].trial.candidate.effect.name in OF_THE_MOMENT:
+    if asked.held is None or found.taken[number].trial.candidate.effect.momentary:
         return share, None
     without, with_it = verification.residuals(
         less, left.last, (place.held, where.held), left.rephased
@@ -396,16 +381,16 @@ def _shares(
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
 
 
-def _dated(parameters: dict[str, Estimate], evidence: Evidence) -> dict[str, Estimate]:
+def _dated(parameters: dict[str, Estimate], moment: str, evidence: Evidence) -> dict[str, Estimate]:
     """A step lies somewhere between two rows, each blurred by the kernel; at rest they are far
     apart. The error of a time that may be anywhere in that width, s.
     """
-    own = parameters["step_time"]
+    own = parameters[moment]
     times = np.asarray(evidence.motion.time)[evidence.centre]
     after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
     width = times[after] - times[after - 1] + evidence.reach
     error = np.hypot(own.standard_error, width / np.sqrt(12))
-    return parameters | {"step_time": own._replace(standard_error=np.float64(error))}
+    return parameters | {moment: own._replace(standard_error=np.float64(error))}
 
 
 def _everywhere(places: list[dict], findings: list[Finding], first: Fit) -> list[dict[str, Any]]:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from .. import terms as laws
 from ..data.recording import Recording
-from ..terms.effects import EFFECTS
+from ..terms.effect import Effect
+from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
 from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial
@@ -28,7 +28,6 @@ from .regression import Fit, fast, fit, without
 
 Undo = Callable[[Recording, float], Recording]
 
-LATE = (laws.TransportDelay, laws.ActuatorLag)
 # Steps, from the first-order estimate, which may be off by its own second order, to times between
 # which the least energy lies; and parabolas from there on, until the time is this well known.
 STRIDE, STRIDES = 1.3, 12
@@ -55,7 +54,7 @@ class Late(NamedTuple):
 def late(recording: Recording, asked: Question, found: Named) -> Late | None:
     """The delay or lag among the findings under its right name, where there is one."""
     start = len(found.last.terms) - len(found.taken)
-    places = [i for i, term in enumerate(found.last.terms) if isinstance(term, LATE)]
+    places = [i for i, term in enumerate(found.last.terms) if traits(term).late]
     if len(places) != 1 or places[0] < start:
         return None
     place = places[0]
@@ -78,30 +77,30 @@ def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 
     is at once where nothing is late. What is found is judged by the blocks, with random signs of
     what it changes in each of them, and has to show through a kernel of twice the width too.
     """
-    if any(isinstance(term, LATE) for term in found.last.terms):
+    if any(traits(term).late for term in found.last.terms):
         return None
     undoing = _Undoing(recording, asked, found.last)
     before = undoing.rest(_as_it_is, 0.0)
     power, limits = before @ before, asked.evidence.limits
     tried = []
-    for undo in WAYS.values():
+    for effect in ways():
         time = limits.interval
         while time < limits.duration / BLOCKS:
-            tried.append((undo, time, undoing.rest(undo, time)))
+            tried.append((effect, time, undoing.rest(effect.undone, time)))
             if tried[-1][2] @ tried[-1][2] > power:
                 break
             time *= 2
         if len(tried) == 1:  # harm at once, and to first order a lag is a delay
             return None
-    undo, time, rest = min(tried, key=lambda each: each[2] @ each[2])
-    gain = float(1 - rest @ rest / power)
+    effect, time, rest = min(tried, key=lambda each: each[2] @ each[2])
+    gain, undo = float(1 - rest @ rest / power), effect.undone
     wide = asked.wide
     if gain < MOST_LATE or (wide and undoing.gain(undo, time, wide.width) < MOST_LATE):
         return None
     p_value = agreement(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
     if p_value > LEVEL:
         return None
-    candidate = Candidate(EFFECTS["actuator_lag"], laws.ActuatorLag(), np.zeros((1, 0)))
+    candidate = _candidate(effect)
     trial = Trial(candidate, np.zeros(0), gain, 0.0, 1, p_value, np.inf, 1.0)
     return _told_apart(undoing, time, Taken(trial, (), p_value), found.left.size)
 
@@ -112,7 +111,7 @@ class _Undoing:
     def __init__(self, recording: Recording, asked: Question, known: Fit):
         self.motion, self.asked, self.known = from_position(recording), asked, known
         pairs = zip(known.terms, known.betas, strict=True)
-        self.terms, self.betas = zip(*(p for p in pairs if not isinstance(p[0], LATE)), strict=True)
+        self.terms, self.betas = zip(*(p for p in pairs if not traits(p[0]).late), strict=True)
         noise = np.random.default_rng(0).normal(size=self.motion.num_samples)
         self.noise = dataclasses.replace(self.motion, force=jnp.asarray(noise))
         self.hiss = functools.cache(self._hiss)
@@ -182,26 +181,29 @@ def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
 def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> Late:
     """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
     asked = undoing.asked
-    least = {way: undoing.least(undo, guess) for way, undo in WAYS.items()}
-    gap = 0.5 * size * np.log(least["actuator_lag"][0] / least["transport_delay"][0])
-    best = "transport_delay" if gap > 0 else "actuator_lag"
-    rivals = tuple(r for r in taken.rivals if r not in WAYS)
-    if abs(gap) < RIVAL:
-        rivals = (*(way for way in WAYS if way != best), *rivals)
-    time = least[best][1]
+    least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
+    best = EFFECTS[min(least, key=lambda name: least[name][0])]
+    energy, time = least.pop(best.name)
+    others = {name: 0.5 * size * np.log(left / energy) for name, (left, _) in least.items()}
+    near = (name for name, gap in others.items() if gap < RIVAL)
+    rivals = (*near, *(r for r in taken.rivals if r != best.name and r not in others))
     wide = time
     if asked.wide is not None:
-        wide = undoing.least(WAYS[best], time, 2 * asked.evidence.width)[1]
+        wide = undoing.least(best.undone, time, 2 * asked.evidence.width)[1]
     # Smoothing errs with the square of the width, so a third of what doubling it changes is left
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
     smoothed = float(np.hypot((wide - time) / 3, asked.evidence.limits.interval / np.sqrt(12)))
-    return Late(time, WAYS[best], _renamed(taken, best, rivals), smoothed)
+    trial = taken.trial._replace(candidate=_candidate(best))
+    return Late(time, best.undone, taken._replace(trial=trial, rivals=rivals), smoothed)
 
 
-def _renamed(taken: Taken, name: str, rivals: tuple[str, ...]) -> Taken:
-    kind = laws.TransportDelay if name == "transport_delay" else laws.ActuatorLag
-    candidate = Candidate(EFFECTS[name], kind(), taken.trial.candidate.betas)
-    return taken._replace(trial=taken.trial._replace(candidate=candidate), rivals=rivals)
+def ways() -> list[Effect]:
+    """The effects by which the force acts late as a whole."""
+    return [effect for effect in EFFECTS.values() if effect.late]
+
+
+def _candidate(effect: Effect) -> Candidate:
+    return Candidate(effect, effect.laws[0](), np.zeros((1, 0)))
 
 
 def settled(
@@ -212,8 +214,8 @@ def settled(
     Beside it the same without, on the recording with the force put back, `there`: what that leaves
     is what the findings leave, while a column for the delay keeps its second order.
     """
-    others = [t for t in behind.taken if not isinstance(t.trial.candidate.term, LATE)]
-    kept = [i for i, term in enumerate(behind.last.terms) if not isinstance(term, LATE)]
+    others = [t for t in behind.taken if not t.trial.candidate.effect.late]
+    kept = [i for i, term in enumerate(behind.last.terms) if not traits(term).late]
     seen = with_predictions(there.evidence, behind.last)
     left = fit([behind.last.terms[i] for i in kept], seen, [behind.last.betas[i] for i in kept], 6)
     known = lateness.taken.trial.candidate
@@ -239,35 +241,5 @@ def settled(
     return found, rest
 
 
-def _earlier(motion: Recording, delay: float) -> Recording:
-    time, force = np.asarray(motion.time), np.asarray(motion.force)
-    moved = np.empty_like(force)
-    segment = np.asarray(motion.segment)
-    for label in np.unique(segment):
-        own = segment == label
-        moved[own] = np.interp(time[own] - delay, time[own], force[own])
-    return dataclasses.replace(motion, force=jnp.asarray(moved))
-
-
-def _lagged(motion: Recording, lag: float) -> Recording:
-    """The force through 1/(1 + T s), exact for straight lines between the samples."""
-    time, force = np.asarray(motion.time), np.asarray(motion.force)
-    step = np.diff(time, prepend=time[0])
-    keep = np.exp(-np.clip(step, 0.0, None) / lag)
-    new = np.diff(np.asarray(motion.segment), prepend=-1) != 0
-    out, state, before = np.empty_like(force), 0.0, 0.0
-    for i, (u, k, h, fresh) in enumerate(zip(force, keep, step, new, strict=True)):
-        if fresh or h <= 0:
-            state = u
-        else:
-            slope = (u - before) / h
-            state = k * (state - before + slope * lag) + u - slope * lag
-        out[i], before = state, u
-    return dataclasses.replace(motion, force=jnp.asarray(out))
-
-
 def _as_it_is(motion: Recording, _: float) -> Recording:
     return motion
-
-
-WAYS = {"transport_delay": _earlier, "actuator_lag": _lagged}

@@ -2,19 +2,14 @@
 
 import numpy as np
 
-from .. import terms as laws
+from ..terms.base import AbstractTerm
+from ..terms.effects import traits
 from .baseline import as_given
 from .contest import Contest
 from .evidence import Evidence
 from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
 from .regression import Fit, fast, without
-
-# What belongs to a moment of one recording says nothing about another.
-_MOMENTARY = (
-    laws.FrictionStep, laws.LoadDrift, laws.ThermalDrift, laws.DisturbancePulses,
-    laws.PeriodicDisturbance, laws.PayloadChange, laws.GainStep,
-)  # fmt: skip
 
 
 def residual(
@@ -74,7 +69,7 @@ def wavelike(now: Fit, number: int) -> bool:
 def lasting(now: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
     """A fit without the terms that say nothing of another recording; only its terms and β count."""
     return now.only(
-        [i for i, t in enumerate(now.terms) if i not in rephased and not isinstance(t, _MOMENTARY)]
+        [i for i, t in enumerate(now.terms) if i not in rephased and not traits(t).momentary]
     )
 
 
@@ -102,7 +97,7 @@ def carried(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
 
 def _ways(now: Fit, evidence: Evidence, rephased: frozenset[int]):
     """Residual, affine parameters and terms left out, for each way in which moments may return."""
-    moments = frozenset(i for i, t in enumerate(now.terms) if i and isinstance(t, _MOMENTARY))
+    moments = frozenset(i for i, t in enumerate(now.terms) if i and traits(t).momentary)
     ways = [(rephased, frozenset[int]())]
     if moments:
         ways.append((rephased, moments))
@@ -153,9 +148,7 @@ def residuals(
     )
     shared = {id(t) for t in less.terms[1:] if any(t is m for m in more.terms)}
     idle = [
-        frozenset(
-            i for i, t in enumerate(now.terms) if id(t) in shared and isinstance(t, _MOMENTARY)
-        )
+        frozenset(i for i, t in enumerate(now.terms) if id(t) in shared and traits(t).momentary)
         for now in (less, more)
     ]
 
@@ -179,7 +172,12 @@ def residuals(
 def _tones(now: Fit) -> frozenset[int]:
     """Numbers of the found terms that are tones in time."""
     known = enumerate(now.terms)
-    return frozenset(i for i, t in known if i and isinstance(t, laws.PeriodicDisturbance))
+    return frozenset(i for i, t in known if i and _is_tone(t))
+
+
+def _is_tone(term: AbstractTerm) -> bool:
+    waves = traits(term).waves(term)
+    return waves is not None and waves.coordinate == "time"
 
 
 def noise(now: Fit, reference: np.ndarray) -> float:

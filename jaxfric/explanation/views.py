@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..identification.uncertainty import Estimate
+from ..terms.effects import traits
 from . import parameters as spelled, verification
 from .evidence import Evidence
 from .naming import Named
 from .predictions import with_predictions
 from .question import Question
 from .regression import Fit, fit
-from .timing import LATE
 
 
 def estimated(found: Named, asked: Question, rest) -> list[dict[str, Estimate]]:
@@ -23,7 +23,7 @@ def estimated(found: Named, asked: Question, rest) -> list[dict[str, Estimate]]:
     """
     units = asked.evidence.motion.unit_names
     ours = spelled.estimates(found.last, asked.block, units)
-    where, left = rest if isinstance(found.last.terms[-1], LATE) else (asked, found)
+    where, left = rest if traits(found.last.terms[-1]).late else (asked, found)
     late = [
         {
             name: own._replace(standard_error=np.hypot(own.standard_error, found.smoothed))

@@ -2,7 +2,6 @@
 
 import abc
 import dataclasses
-import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -24,10 +23,9 @@ from ..terms import (
     Viscous,
 )
 from ..terms.base import AbstractTerm, Sum, summands
+from ..units import TURNS
 
 Force = ArrayLike | Callable[[Recording], ArrayLike]
-# One revolution, by the unit of the position.
-TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
 # Of the motion two files of one recording differ by no more than the digits they were written with.
 SAME = 1e-3
 

@@ -6,7 +6,7 @@ for (`jaxfric.identification`), and then live beside the terms in a [`Model`][ja
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from .sample import Parameter, Sample, Scales, samples
+from .sample import Burden, Parameter, Sample, Scales, samples
 
 
 class AbstractTerm(eqx.Module):
@@ -25,6 +25,20 @@ class AbstractTerm(eqx.Module):
     Terms add (`+`), and [`Directional`][] gives each direction of motion its own parameters.
     To write a term of your own, derive from [`AbstractLaw`][].
     """
+
+    stepped: ClassVar[bool] = False
+    """Whether its columns are stepped along the motion several times a sample."""
+    swings: ClassVar[bool] = False
+    """Whether it holds a load that swings, or strikes, faster than a wide kernel resolves."""
+
+    @property
+    def chosen(self) -> int:
+        """How many given numbers of it the residual itself has suggested."""
+        return 0
+
+    def burden(self, beta: np.ndarray, alpha: np.ndarray) -> Burden | None:
+        """What it takes of the machine's inertia and friction; `None` where it is no part of it."""
+        return None
 
     @property
     @abstractmethod
@@ -233,6 +247,15 @@ def summands(term: AbstractTerm) -> tuple[AbstractTerm, ...]:
     if not isinstance(term, Sum):
         return (term,)
     return tuple(leaf for part in term.terms for leaf in summands(part))
+
+
+def leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
+    """The single terms of a sum, of those with a direction the positive one."""
+    for part in summands(term):
+        if isinstance(part, Directional):
+            yield from leaves(part.positive)
+        else:
+            yield part
 
 
 def bounds(

@@ -26,6 +26,7 @@ class Offset(AbstractLaw):
     """Constant force: u = F₀ (weight of a vertical axis, amplifier offset)."""
 
     affine: ClassVar = (Parameter("offset", FORCE),)
+    coordinates: ClassVar = frozenset()
 
     def law(self, sample: Sample):
         return (jnp.ones_like(sample.velocity),)

@@ -102,7 +102,9 @@ class GravityUnbalance(AbstractLaw):
 
     unbalance_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("unbalance", FORCE)
-    nonlinear: ClassVar = (Parameter("unbalance_period", POSITION, _long_bounds, resolution=_LONG),)
+    nonlinear: ClassVar = (
+        Parameter("unbalance_period", POSITION, _long_bounds, resolution=_LONG, repeats=True),
+    )
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
@@ -141,7 +143,7 @@ class Cogging(AbstractLaw):
     @property
     def nonlinear(self):
         grid = _cycles(self.harmonics)
-        return (Parameter("pitch", POSITION, _pitch_bounds, resolution=grid),)
+        return (Parameter("pitch", POSITION, _pitch_bounds, resolution=grid, repeats=True),)
 
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.pitch, self.harmonics)
@@ -229,7 +231,7 @@ class PositionDependentFriction(AbstractLaw):
     friction_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("friction", FORCE)
     nonlinear: ClassVar = (
-        Parameter("friction_period", POSITION, _any_period, resolution=_cycles()),
+        Parameter("friction_period", POSITION, _any_period, resolution=_cycles(), repeats=True),
     )
     coordinates: ClassVar = WITH_DIRECTION
 
@@ -267,7 +269,7 @@ class PositionDependentInertia(AbstractLaw):
     inertia_period: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("inertia", INERTIA)
     nonlinear: ClassVar = (
-        Parameter("inertia_period", POSITION, _any_period, resolution=_cycles()),
+        Parameter("inertia_period", POSITION, _any_period, resolution=_cycles(), repeats=True),
     )
     coordinates: ClassVar = frozenset({"position", "velocity", "acceleration"})
 

@@ -17,7 +17,7 @@ from ..data.recording import Recording
 from ..units import FORCE, POSITION, TIME, VELOCITY
 from .base import AbstractTerm, joined, vector
 from .friction import AbstractBump, Gaussian
-from .sample import Parameter
+from .sample import Burden, Parameter
 
 UNKNOWN = float("nan")
 
@@ -197,6 +197,9 @@ class FrictionalLag(AbstractMemory):
         return dataclasses.replace(
             self, frictional_lag=beta[..., 0], bump=self.bump.with_beta(beta[..., 1:])
         )
+
+    def burden(self, beta, alpha) -> Burden:
+        return Burden(0.0, float(alpha[0]), curved=True)
 
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
         direction, speed = jnp.sign(recording.velocity), jnp.abs(recording.velocity)

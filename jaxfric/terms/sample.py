@@ -5,10 +5,11 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from ..units import DIMENSIONLESS, Dimension
+from ..units import DIMENSIONLESS, FREQUENCY, Dimension
 
 
 class Sample(eqx.Module):
@@ -57,6 +58,21 @@ class Scales(NamedTuple):
     interval: Float[Array, ""]
 
 
+class Burden(NamedTuple):
+    """What a term takes for itself of a machine: the load behind a spring, the memory of a bump.
+
+    `inertia`, kg, and `friction`, N, of which a machine has no more; `give`, m, by which a spring
+    gives way under that friction; `curved`: whether the friction is a part of a Stribeck curve;
+    `lighter`: β with the inertia divided by a number, where the data tell it badly.
+    """
+
+    inertia: float
+    friction: float
+    give: float = 0.0
+    curved: bool = False
+    lighter: Callable[[float], np.ndarray] | None = None
+
+
 class Resolution(NamedTuple):
     """How finely the cost has to be looked at along a parameter β: points of equal steps in β^p.
 
@@ -84,7 +100,8 @@ class Parameter(NamedTuple):
     `bounds` maps the [`Scales`][] of a recording to `(lower, upper)`, the set B of Kim, Kim & Ha
     (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio. `resolution`
     says how near to each other two minima of the cost can be; `None` for a cost that is smooth over
-    octaves, or over a fraction of the range where the scale is no ratio.
+    octaves, or over a fraction of the range where the scale is no ratio. `repeats`: whether it is
+    the period of a wave over position or time, or its frequency.
     """
 
     name: str
@@ -92,3 +109,10 @@ class Parameter(NamedTuple):
     bounds: Callable[[Scales], tuple[Array, Array]] | None = None
     logarithmic: bool = True
     resolution: Resolution | None = None
+    repeats: bool = False
+
+    def period(self, value: float) -> float | None:
+        """The period of the wave whose period or frequency it is; `None` for another parameter."""
+        if not self.repeats:
+            return None
+        return 1 / value if self.dimension == FREQUENCY else value

@@ -254,7 +254,9 @@ class PeriodicDisturbance(AbstractLaw):
 
     frequency: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = wave("tone", FORCE)
-    nonlinear: ClassVar = (Parameter("frequency", FREQUENCY, _frequency_bounds, resolution=_TONES),)
+    nonlinear: ClassVar = (
+        Parameter("frequency", FREQUENCY, _frequency_bounds, resolution=_TONES, repeats=True),
+    )
     coordinates: ClassVar = frozenset({"time"})
 
     def law(self, sample: Sample):
@@ -274,6 +276,10 @@ class DisturbancePulses(AbstractLaw):
     @property
     def affine(self):
         return tuple(Parameter(f"pulse_{i + 1}", FORCE) for i in range(len(self.times)))
+
+    @property
+    def chosen(self) -> int:
+        return len(self.times) + 1
 
     def law(self, sample: Sample):
         places = [jnp.clip((sample.time - at) / self.width, -1.0, 1.0) for at in self.times]

@@ -5,12 +5,13 @@ from typing import ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..units import ACCELERATION, DIMENSIONLESS, FORCE, FREQUENCY, INERTIA, POSITION
 from .presliding import AbstractMemory, starts
-from .sample import Parameter, Resolution
+from .sample import Burden, Parameter, Resolution
 
 UNKNOWN = float("nan")
 
@@ -97,9 +98,19 @@ class ElasticBacklash(AbstractMemory):
     )
     coordinates: ClassVar = frozenset({"position", "velocity", "time"})
 
+    stepped: ClassVar = True
+    swings: ClassVar = True
+
     @property
     def inertial(self) -> bool:
         return True
+
+    def burden(self, beta, alpha) -> Burden:
+        def lighter(factor: float) -> np.ndarray:
+            # The rows tell the friction well, and the inertia only by how the load coasts.
+            return beta * np.array([1.0, 1.0, factor])
+
+        return Burden(float(alpha[0] / beta[2]), float(alpha[0]), lighter=lighter)
 
     def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
         return -recording.velocity[:, None] / self.load_deceleration
@@ -205,6 +216,7 @@ class Compliance(AbstractMemory):
         Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_RESONANCES),
         Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds, resolution=_DAMPINGS),
     )
+    swings: ClassVar = True
 
     def __check_init__(self):
         if self.driven not in _DRIVES:
@@ -217,6 +229,10 @@ class Compliance(AbstractMemory):
     @property
     def inertial(self) -> bool:
         return True
+
+    def burden(self, beta, alpha) -> Burden:
+        known = {p.name: float(a) for p, a in zip(self.affine, alpha, strict=True)}
+        return Burden(known.get("load_inertia", 0.0), known.get("load_friction", 0.0))
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
@@ -292,9 +308,17 @@ class DryCompliance(AbstractMemory):
     )
     coordinates: ClassVar = frozenset({"position", "velocity", "time"})
 
+    stepped: ClassVar = True
+    swings: ClassVar = True
+
     @property
     def inertial(self) -> bool:
         return True
+
+    def burden(self, beta, alpha) -> Burden:
+        resonance, _, slow = beta
+        give = slow / (2 * np.pi * resonance) ** 2
+        return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give)
 
     def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
         return -recording.velocity[:, None]

@@ -1,15 +1,13 @@
-"""Isolated pushes: candidates whose places the residual itself has to say."""
+"""Isolated pushes, whose places the residual itself has to say."""
 
+from collections.abc import Iterator
 from math import comb
 
 import numpy as np
 
-from .. import terms as laws
-from ..terms.effects import EFFECTS
-from .candidates import Candidate
-from .chance import LEVEL
-from .evidence import Evidence
-from .regression import Fit
+from ..base import AbstractTerm
+from ..effect import Effect, Residual
+from ..time import DisturbancePulses
 
 # Standard deviations that a push must stand out by: of ten thousand places, noise reaches five in
 # one record of two hundred.
@@ -18,61 +16,45 @@ OUTSTANDING = 5.0
 MOST, LARGEST_PART = 12, 0.2
 
 
-def pulses(evidence: Evidence, now: Fit) -> list[Candidate]:
-    """The pushes that stand out of a residual, for the width that makes most of them.
+def pulses(left: Residual) -> Iterator[AbstractTerm]:
+    """The pushes that stand out of a residual, for each width of them.
 
     A matched filter with the pulse's shape at each width; its spread is taken from the median, so
     that the pushes themselves do not raise it (Hampel 1974).
     """
-    if not evidence.clock:
-        return []
-    time = np.asarray(evidence.motion.time)[evidence.centre]
-    spacing = 0.5 * evidence.reach
+    time, spacing = left.time, 0.5 * left.reach
     widths = spacing * np.geomspace(2.0, max(4.0, 0.02 * len(time)), 14)
-    best, found = 0.0, None
     for width in widths:
-        places = _outstanding(now.residual, time, width, spacing)
+        places = _outstanding(left.values, time, width, spacing)
         if not places or 2 * width * len(places) > LARGEST_PART * (time[-1] - time[0]):
             continue
-        if _at_reversals(evidence, places, width):
-            continue
-        candidate = Candidate(
-            EFFECTS["disturbance_pulses"],
-            laws.DisturbancePulses(tuple(places), float(width)),
-            np.zeros((1, 0)),
-        )
-        columns = candidate.columns(evidence)[0]
-        gain = now.residual @ columns @ np.linalg.lstsq(columns, now.residual, rcond=1e-9)[0]
-        if gain > best:
-            best, found = gain, candidate
-    return [] if found is None else [found]
+        if not _at_reversals(left, places, width):
+            yield DisturbancePulses(tuple(places), float(width))
 
 
-def _at_reversals(evidence: Evidence, places: list[float], width: float) -> bool:
+def _at_reversals(left: Residual, places: list[float], width: float) -> bool:
     """Whether the pushes seek the reversals: then they are what a reversal does, no isolated ones.
 
     Had they nothing to do with reversals, as many as that would lie beside one by chance in one
     case of a hundred.
     """
-    time, velocity = evidence.elapsed[: evidence.nodes], np.asarray(evidence.motion.velocity)
-    turns = time[1:][np.diff(np.sign(velocity[: evidence.nodes])) != 0]
+    turns = left.turns
     if not len(turns):
         return False
-    near = width + 2 * evidence.reach
+    near = width + 2 * left.reach
 
     def beside(moments):
         after = np.searchsorted(turns, moments)
         around = turns[np.clip(np.stack([after - 1, after]), 0, len(turns) - 1)]
         return np.min(np.abs(around - moments), axis=0) < near
 
-    chance = float(np.mean(beside(evidence.elapsed[evidence.centre])))
-    clock = np.asarray(evidence.motion.time)[: evidence.nodes]
-    count = int(np.sum(beside(np.interp(places, clock, time))))
+    chance = float(np.mean(beside(left.elapsed)))
+    count = int(np.sum(beside(np.interp(places, left.clock, left.run))))
     total = len(places)
     tail = [
         comb(total, k) * chance**k * (1 - chance) ** (total - k) for k in range(count, total + 1)
     ]
-    return sum(tail) <= LEVEL
+    return sum(tail) <= left.level
 
 
 def _outstanding(residual, time, width, spacing) -> list[float]:
@@ -104,3 +86,20 @@ def _summit(time, height, peak) -> float:
     bend = before - 2 * at + after
     share = 0.5 * (before - after) / bend if bend < 0 else 0.0
     return float(time[peak] + share * 0.5 * (time[peak + 1] - time[peak - 1]))
+
+
+DISTURBANCE_PULSES = Effect(
+    "disturbance_pulses",
+    "Σ A_i pulse(t − t_i)",
+    "time",
+    "Isolated pushes at single times",
+    laws=(DisturbancePulses,),
+    scaled=lambda scales: (),
+    coordinates=("time",),
+    confusable_with=("sticky_spot",),
+    separate_by="Repeat the motion: what belongs to the machine comes again.",
+    momentary=True,
+    leftover=True,
+    isolated=True,
+    outstanding=pulses,
+)

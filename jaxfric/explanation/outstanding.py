@@ -1,0 +1,47 @@
+"""Effects whose places the residual itself has to say."""
+
+import numpy as np
+
+from ..terms.effect import Effect, Residual
+from ..terms.effects import EFFECTS, traits
+from .candidates import Candidate
+from .chance import LEVEL
+from .evidence import Evidence
+from .regression import Fit
+
+
+def outstanding(evidence: Evidence, now: Fit) -> list[Candidate]:
+    """What stands out of a residual, of each effect that is not in the fit its best law."""
+    if not evidence.clock:
+        return []
+    known = {traits(term).name for term in now.terms}
+    left = _residual(evidence, now)
+    others = [effect for effect in EFFECTS.values() if effect.name not in known]
+    best = (_best(effect, left, evidence, now) for effect in others)
+    return [candidate for candidate in best if candidate is not None]
+
+
+def _residual(evidence: Evidence, now: Fit) -> Residual:
+    clock = np.asarray(evidence.motion.time)
+    run, velocity = evidence.elapsed[: evidence.nodes], np.asarray(evidence.motion.velocity)
+    return Residual(
+        values=now.residual,
+        time=clock[evidence.centre],
+        elapsed=evidence.elapsed[evidence.centre],
+        reach=evidence.reach,
+        clock=clock[: evidence.nodes],
+        run=run,
+        turns=run[1:][np.diff(np.sign(velocity[: evidence.nodes])) != 0],
+        level=LEVEL,
+    )
+
+
+def _best(effect: Effect, left: Residual, evidence: Evidence, now: Fit) -> Candidate | None:
+    most, found = 0.0, None
+    for term in effect.outstanding(left):
+        candidate = Candidate(effect, term, np.zeros((1, 0)))
+        columns = candidate.columns(evidence)[0]
+        gain = now.residual @ columns @ np.linalg.lstsq(columns, now.residual, rcond=1e-9)[0]
+        if gain > most:
+            most, found = gain, candidate
+    return found

@@ -1,0 +1,236 @@
+"""What is said of an effect: its laws, where it shows, how it is searched for and told."""
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from ..data.recording import Recording
+from ..units import POSITION
+from .base import AbstractTerm
+from .sample import Scales
+
+FAMILIES = ("values", "friction", "position", "reversals", "actuator", "time", "neighbour")
+"""Kinds of effects, in the order in which they are listed."""
+
+# A recording of ones: names and dimensions of an effect's parameters do not depend on it.
+ANY = Scales(*[1.0] * len(Scales._fields))
+
+
+class View(NamedTuple):
+    """What the search for a term sees of a recording.
+
+    `limits`: its scales, as floats; `reach`: the kernel's half-width, s, of `nodes` local means;
+    `speed`: the median in slip, m/s; `acceleration`: 98 % of those at the nodes are below it, m/s².
+    """
+
+    limits: Scales
+    reach: float
+    nodes: int
+    speed: float
+    acceleration: float
+
+
+class Waves(NamedTuple):
+    """A law that is a wave over a coordinate: its grid is the spectral lines of a recording.
+
+    `coordinate`: "position" or "time"; `inverse`: whether the parameter is a period; `sided`:
+    whether the wave changes its sign with the direction; `harmonics`.
+    """
+
+    coordinate: str
+    inverse: bool
+    sided: bool = False
+    harmonics: int = 1
+
+
+class Residual(NamedTuple):
+    """What a fit leaves of a recording, row by row.
+
+    `values`, N; `time`, s, and `elapsed`, s, without interruptions, each `(J,)`; `reach` of a row
+    to either side, s, twice their spacing; `clock` and `run`: time and elapsed time at the nodes;
+    `turns`: elapsed times at which the axis reverses, s; `level` of significance.
+    """
+
+    values: np.ndarray
+    time: np.ndarray
+    elapsed: np.ndarray
+    reach: float
+    clock: np.ndarray
+    run: np.ndarray
+    turns: np.ndarray
+    level: float
+
+
+class Extent(NamedTuple):
+    """Magnitudes of a recording that a sentence is measured by.
+
+    `low` and `high`: the range of the position, m; `force`: root mean square, N.
+    """
+
+    low: float = 0.0
+    high: float = float("inf")
+    force: float = float("nan")
+
+    @property
+    def stroke(self) -> float:
+        """The range of the position, m."""
+        return self.high - self.low
+
+
+def inside(term: AbstractTerm, limits: Scales, place: Float[np.ndarray, "... d"]) -> np.ndarray:
+    """β at coordinates from 0 to 1 of a term's compact set, `(..., d)`."""
+    pairs = [tuple(float(x) for x in p.bounds(limits)) for p in term.nonlinear]
+    box = np.array(pairs, float).reshape(-1, 2).T
+    ratio = np.array([p.logarithmic for p in term.nonlinear], bool)
+    low, high = (np.where(ratio, np.log(np.where(ratio, end, 1.0)), end) for end in box)
+    high = np.maximum(high, low + 1e-9 * (1 + np.abs(low)))
+    raw = low + place * (high - low)
+    return np.where(ratio, np.exp(np.where(ratio, raw, 0.0)), raw)
+
+
+# Points of a grid over one nonlinear parameter, where nothing finer is needed.
+GRID = 24
+
+
+def even(term: AbstractTerm, view: View, points: int = GRID) -> np.ndarray:
+    """All nonlinear parameters together along the diagonal of the compact set, `(G, d)`."""
+    count = len(term.nonlinear)
+    if not count:
+        return np.zeros((1, 0))
+    along = (np.arange(points) + 0.5) / points
+    return inside(term, view.limits, np.repeat(along[:, None], count, axis=1))
+
+
+def product(axes) -> np.ndarray:
+    """All combinations of values along several axes, `(G, d)`."""
+    return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
+
+
+# Fewer periods in the stroke are no repetition.
+REPEATED = 1.5
+
+
+def slowly(period: str, text: str) -> Callable[[Mapping[str, float], Extent], str | None]:
+    """Another sentence, `text`, where a wave does not repeat within the stroke."""
+    return lambda values, extent: text if values[period] * REPEATED > extent.stroke else None
+
+
+def _as_it_is(term: AbstractTerm, base: AbstractTerm, turn: float | None) -> AbstractTerm:
+    return term
+
+
+def _no_waves(term: AbstractTerm) -> None:
+    return None
+
+
+def _no_variant(values: Mapping[str, float], extent: Extent) -> None:
+    return None
+
+
+def _nothing(left: Residual) -> Iterator[AbstractTerm]:
+    return iter(())
+
+
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """One kind of missing physics: all that the package knows of it.
+
+    What it is:
+
+    - `name`: its public name. `equation`: as displayed to the user. `family`: of [`FAMILIES`][].
+    - `laws`: the terms that model it, each a rival of the others. `scaled`: these from the
+      [`Scales`][] of a recording (with values, outside jit), where they are not each law as it is;
+      none where no term can be tried without looking at the residual. `suited`: a term for a
+      baseline, and for a position of which `turn` is one revolution (`None`: no angle).
+
+    Where it shows:
+
+    - `coordinates`: those of `jaxfric.explain.locate`, the most telling first.
+    - `needs`: signals beside time, velocity and force that a recording must have.
+    - `confusable_with`: effects that leave nearly the same trace on an unlucky recording.
+    - `separate_by`: the experiment that tells it from these.
+
+    What it is like:
+
+    - `positive`: its affine parameters are magnitudes, so that a fit with another sign is something
+      else (friction dissipates, a delay is late, a stop pushes back).
+    - `first_order`: its terms are but the first order of the effect, or one law of many.
+    - `at_reversals`: it is an idealisation of what happens about a reversal.
+    - `momentary`: time alone drives it, so that another recording need not show it.
+    - `sharp`: its columns hold a derivative of the acceleration: what the encoder's noise makes of
+      that is the noise that the controller answered, which explains force without physics.
+    - `delays`: to first order it delays the force, so that force and motion are aligned without it.
+    - `leftover`: strong effects leave something of its shape.
+    - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
+    - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
+    - `several`: there may be more than one of it, as of two end stops.
+    - `switches`: its column jumps with the sign of the force, which the command says best.
+
+    How it is searched for:
+
+    - `waves`: of a law that is a wave, over what; `grid`: of another one the β to try, `(G, d)`.
+    - `outstanding`: laws that the residual itself suggests.
+    - `undone`: the recording with the force where it belongs, for a force that acts late by a time,
+      s; `shift`: the parameter by which a prediction takes the force later, if by the whole of it.
+
+    How it is told:
+
+    - `sentence`: with parameters in braces; `variant`: another sentence where the name promises
+      more than the values hold. `sizes`: parameters of which only the most is known where other
+      terms could stand in for all of it. `moment`: the parameter that dates it.
+    """
+
+    name: str
+    equation: str
+    family: str
+    sentence: str = ""
+    laws: tuple[type[AbstractTerm], ...] = ()
+    scaled: Callable[[Scales], tuple[AbstractTerm, ...]] | None = None
+    suited: Callable[[Any, AbstractTerm, float | None], AbstractTerm] = _as_it_is
+    coordinates: tuple[str, ...] = ()
+    needs: frozenset[str] = frozenset()
+    confusable_with: tuple[str, ...] = ()
+    separate_by: str = ""
+    positive: bool = False
+    first_order: bool = False
+    at_reversals: bool = False
+    momentary: bool = False
+    sharp: bool = False
+    delays: bool = False
+    leftover: bool = False
+    isolated: bool = False
+    ubiquitous: bool = False
+    several: bool = False
+    switches: bool = False
+    waves: Callable[[Any], Waves | None] = _no_waves
+    grid: Callable[[Any, View], np.ndarray] = even
+    outstanding: Callable[[Residual], Iterator[AbstractTerm]] = _nothing
+    undone: Callable[[Recording, float], Recording] | None = None
+    shift: str = ""
+    variant: Callable[[Mapping[str, float], Extent], str | None] = _no_variant
+    sizes: tuple[str, ...] = ("amplitude",)
+    moment: str = ""
+
+    def __post_init__(self) -> None:
+        if self.family not in FAMILIES:
+            raise ValueError(
+                f"{self.name} is of family {self.family!r}; there are {', '.join(FAMILIES)}."
+            )
+
+    def shapes(self, scales: Scales) -> tuple[AbstractTerm, ...]:
+        """The terms that model it on a recording of these scales."""
+        return tuple(law() for law in self.laws) if self.scaled is None else self.scaled(scales)
+
+    @property
+    def late(self) -> bool:
+        """Whether the force acts late as a whole, and can be put back."""
+        return self.undone is not None
+
+    @property
+    def periods(self) -> frozenset[str]:
+        """The names of its parameters that are periods over the position."""
+        every = (p for term in self.shapes(ANY) for p in term.nonlinear)
+        return frozenset(p.name for p in every if p.repeats and p.dimension == POSITION)

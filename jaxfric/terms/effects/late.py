@@ -1,0 +1,76 @@
+"""A force that acts late: a dead time, or a lag."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+
+from ...data.recording import Recording
+from ..actuator import ActuatorLag, TransportDelay
+from ..effect import Effect
+
+FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quarter turn."
+
+
+def earlier(motion: Recording, delay: float) -> Recording:
+    """The force taken `delay`, s, later: what acted then."""
+    time, force = np.asarray(motion.time), np.asarray(motion.force)
+    moved = np.empty_like(force)
+    segment = np.asarray(motion.segment)
+    for label in np.unique(segment):
+        own = segment == label
+        moved[own] = np.interp(time[own] - delay, time[own], force[own])
+    return dataclasses.replace(motion, force=jnp.asarray(moved))
+
+
+def lagged(motion: Recording, lag: float) -> Recording:
+    """The force through 1/(1 + T s), exact for straight lines between the samples."""
+    time, force = np.asarray(motion.time), np.asarray(motion.force)
+    step = np.diff(time, prepend=time[0])
+    keep = np.exp(-np.clip(step, 0.0, None) / lag)
+    new = np.diff(np.asarray(motion.segment), prepend=-1) != 0
+    out, state, before = np.empty_like(force), 0.0, 0.0
+    for i, (u, k, h, fresh) in enumerate(zip(force, keep, step, new, strict=True)):
+        if fresh or h <= 0:
+            state = u
+        else:
+            slope = (u - before) / h
+            state = k * (state - before + slope * lag) + u - slope * lag
+        out[i], before = state, u
+    return dataclasses.replace(motion, force=jnp.asarray(out))
+
+
+TRANSPORT_DELAY = Effect(
+    "transport_delay",
+    "u = f(t + τ)",
+    "actuator",
+    "The force acts {delay} late: a dead time between command and motion",
+    laws=(TransportDelay,),
+    coordinates=("force_rate",),
+    needs=frozenset({"predicted_force"}),
+    confusable_with=("actuator_lag", "frictional_lag", "compliance"),
+    separate_by=FASTER,
+    positive=True,
+    first_order=True,
+    sharp=True,
+    delays=True,
+    leftover=True,
+    undone=earlier,
+    shift="delay",
+)
+ACTUATOR_LAG = Effect(
+    "actuator_lag",
+    "u = f + T df/dt",
+    "actuator",
+    "The force lags its command by a time constant of {lag}",
+    laws=(ActuatorLag,),
+    coordinates=("force_rate",),
+    needs=frozenset({"predicted_force"}),
+    confusable_with=("transport_delay", "frictional_lag", "compliance"),
+    separate_by=FASTER,
+    positive=True,
+    sharp=True,
+    delays=True,
+    leftover=True,
+    undone=lagged,
+)

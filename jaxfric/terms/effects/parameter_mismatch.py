@@ -1,0 +1,5 @@
+"""Wrong values of the baseline."""
+
+from ..effect import Effect
+
+PARAMETER_MISMATCH = Effect("parameter_mismatch", "θ = θ₀ + Δθ", "values")
