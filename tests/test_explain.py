@@ -22,10 +22,10 @@ from jaxfric.explanation import (
     lines,
     locate,
     naming,
+    outstanding,
     parameters,
     plausible,
     predictions,
-    pulses,
     question,
     regression,
     telling,
@@ -36,7 +36,7 @@ from jaxfric.explanation import (
 )
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.terms.effects import EFFECTS
+from jaxfric.terms.effects import EFFECTS, disturbance_pulses
 from jaxfric.validation import concealed
 
 TIME = np.arange(16384) / 1000.0
@@ -361,7 +361,7 @@ def test_a_filtered_velocity_without_a_position_is_said_to_look_like_a_delay(hea
     found = explain(run, "gaussian")
     # A lag's rate is a pulse at each reversal, so that the predicted force may be worse with it:
     # then it is not named, and the same is said.
-    said = [each.sentence for each in found.findings if each.effect in telling.FILTERED]
+    said = [each.sentence for each in found.findings if EFFECTS[each.effect].late]
     said += [each["text"] for each in found.warnings if each["name"] == "not_better"]
     assert len(said) == 1 and said[0].endswith("recording the position tells.")
     assert ("lag" in said[0] or "late" in said[0]) and found.verdict != "consistent"
@@ -493,9 +493,10 @@ def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
     clock, speed = np.asarray(seen.motion.time), np.asarray(seen.motion.velocity)
     turns = clock[: seen.nodes - 1][np.diff(np.sign(speed[: seen.nodes])) != 0]
-    assert pulses._at_reversals(seen, turns[2:12:2].tolist(), 0.01)
+    left = outstanding._residual(seen, types.SimpleNamespace(residual=np.zeros(len(seen.rows))))
+    assert disturbance_pulses._at_reversals(left, turns[2:12:2].tolist(), 0.01)
     between = 0.5 * (turns[1:] + turns[:-1])[np.argsort(-np.diff(turns))[:5]]
-    assert not pulses._at_reversals(seen, between.tolist(), 0.01)
+    assert not disturbance_pulses._at_reversals(left, between.tolist(), 0.01)
 
 
 def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, monkeypatch):
@@ -565,7 +566,8 @@ def test_an_end_stop_is_told_with_its_place_and_stiffness(end):
 def finalist(term):
     """A candidate of that term, at the nonlinear parameters that it has, beside the base."""
     trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
-    return types.SimpleNamespace(trial=trial, betas=None), np.asarray(term.beta())
+    alpha = np.ones(len(term.affine))
+    return types.SimpleNamespace(trial=trial, betas=None, alpha=alpha), np.asarray(term.beta())
 
 
 @pytest.mark.parametrize(("inertia", "is_one"), [(1.0, True), (12.0, False)])
@@ -587,7 +589,8 @@ def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
         force = evidence.Evidence.columns(asked.evidence, term, beta[None])[0] @ [friction]
         seen = asked.evidence._replace(target=asked.evidence.target + force)
         now = regression.fit([asked.structure], seen, asked.base.betas[:1], 0)
-        found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, (*now.betas, beta), None)
+        alpha, betas = np.array([friction]), (*now.betas, beta)
+        found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, betas, alpha)
         round_ = plausible.machines(contest.Contest([], [found], 100.0), now, seen)
         if kept is None:
             assert not round_.finalists
@@ -912,7 +915,7 @@ def test_a_step_is_dated_between_two_rows(healthy):
     times = np.asarray(seen.motion.time)[seen.centre]
     widest = int(np.argmax(np.diff(times)))
     middle = Estimate(np.float64(times[widest : widest + 2].mean()), np.float64(1e-6), "s")
-    found = telling._dated({"step_time": middle}, seen)["step_time"].standard_error
+    found = telling._dated({"step_time": middle}, "step_time", seen)["step_time"].standard_error
     assert found == pytest.approx((np.diff(times)[widest] + seen.reach) / np.sqrt(12))
 
 

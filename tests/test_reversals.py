@@ -9,6 +9,7 @@ import pytest
 from jaxfric import Recording, explain
 from jaxfric.explanation import evidence, explaining, naming, question, regression, reversals
 from jaxfric.models import named
+from jaxfric.terms.effects import EFFECTS
 
 COUNT, RATE = 24000, 1000.0
 TIME = np.arange(COUNT) / RATE
@@ -124,7 +125,7 @@ def test_what_does_not_act_at_reversals_is_found_without_them():
     asked, found = searched(hilly())
     assert asked.reversals and not asked.within.reversals
     assert names(found.start) == ["cogging"] and names(found)[0] == "cogging"
-    assert set(names(found)[1:]) <= naming.AT_REVERSALS and len(found.taken) > 1
+    assert all(EFFECTS[name].at_reversals for name in names(found)[1:]) and len(found.taken) > 1
     # Refuted or of the reversals, it is no start for another search.
     for gone in ("cogging", "presliding"):
         last, taken = naming._elsewhere(found, frozenset({gone}))
