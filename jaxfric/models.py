@@ -22,6 +22,7 @@ from .looks import html, text
 from .looks.text import Block, Table
 from .terms import bristles
 from .terms.base import AbstractTerm, Directional, Sum, summands
+from .terms.effects import law_named
 from .units import DAMPING, SI, STIFFNESS, spell
 
 SCHEMA = "jaxfric.model/1"
@@ -444,7 +445,7 @@ def _units(units: Any) -> dict[str, str]:
 
 def _term_from_dict(document: Mapping[str, Any]) -> AbstractTerm:
     kind = document["type"]
-    found = getattr(laws, kind, None) if isinstance(kind, str) else None
+    found = getattr(laws, kind, law_named(kind)) if isinstance(kind, str) else None
     if not (isinstance(found, type) and issubclass(found, AbstractTerm)) or isabstract(found):
         raise ValueError(
             f"The model document names a term {short(repr(kind))} that jaxfric.terms does not have."

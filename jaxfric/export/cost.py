@@ -11,12 +11,10 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from .. import terms as laws
 from ..data.recording import Recording
 from ..models import Model
-from ..terms.base import AbstractTerm
+from ..terms.base import Directional
 from ..terms.presliding import AbstractMemory
-from ..terms.time import AbstractModulated
 from ..units import VELOCITY
 from .outcome import ForceError
 from .parts import Part, parts
@@ -59,7 +57,8 @@ def speed_range(model: Model, given: Range | None = None) -> Range:
     slips = [part for part in parts(model) if part.slips]
     values = {name: abs(float(value)) for name, value in model.parameters.items()}
     speeds = [BUMP * values[name] for name in _velocities(model)] + _growing(slips, values)
-    speeds += [max(map(abs, p.law.knots)) for p in slips if isinstance(p.law, laws.Table)]
+    spans = (natural(part, values) for part in slips)
+    speeds += [max(map(abs, found["velocity"])) for found in spans if "velocity" in found]
     return 0.0, max(filter(None, speeds), default=1.0)
 
 
@@ -78,7 +77,7 @@ def _growing(slips: Sequence[Part], values: Mapping[str, float]) -> list[float]:
             force, position, time = parameter.dimension
             if force == 1 and position == -time and time > 0:
                 slopes.append((time, values[name]))
-            elif isinstance(part.law, laws.Coulomb):
+            elif part.law.in_joint == "friction":
                 levels.append(values[name])
     level = max(levels, default=0.0)
     reached = [(level / slope) ** (1 / power) for power, slope in slopes if slope > 0]
@@ -94,40 +93,16 @@ def natural(part: Part, values: Mapping[str, float]) -> dict[str, Range]:
     found: dict[str, Range] = {}
     names = [p.name for p in part.law.nonlinear]
     own = {n: values[o] for n, o in zip(names, part.nonlinear[: len(names)], strict=True)}
-    _natural(part.law, own, found)
-    if isinstance(part.term, laws.Directional) and type(part.term.negative) is type(part.law):
+    _join(found, part.law.extent(own))
+    if isinstance(part.term, Directional) and type(part.term.negative) is type(part.law):
         own = {n: values[o] for n, o in zip(names, part.nonlinear[len(names) :], strict=True)}
-        _natural(part.term.negative, own, found)
+        _join(found, part.term.negative.extent(own))
     return found
 
 
-def _natural(term: AbstractTerm, own: Mapping[str, float], found: dict[str, Range]) -> None:
-    spans: list[tuple[str, Range]] = []
-    for name, value in own.items():
-        if name == "pitch" or name.endswith("_period"):
-            spans.append(("position", (0.0, value)))
-    if isinstance(term, laws.StickySpot):
-        reach = 4 * own["spot_width"]
-        spans.append(("position", (own["spot_position"] - reach, own["spot_position"] + reach)))
-    if isinstance(term, laws.Table):
-        spans.append((term.coordinate, (term.knots[0], term.knots[-1])))
-    if isinstance(term, AbstractModulated | laws.LoadDrift | laws.DisturbancePulses):
-        spans.append(("time", _times(term, own)))
-    if isinstance(term, laws.PeriodicDisturbance):
-        spans.append(("time", (0.0, 1 / own["frequency"])))
-    for coordinate, span in spans:
+def _join(found: dict[str, Range], more: Mapping[str, Range]) -> None:
+    for coordinate, span in more.items():
         found[coordinate] = _wider(found.get(coordinate), span)
-
-
-def _times(term: AbstractTerm, own: Mapping[str, float]) -> Range:
-    if isinstance(term, laws.LoadDrift):
-        return term.start, term.start + term.duration
-    if isinstance(term, laws.DisturbancePulses):
-        return min(term.times) - term.width, max(term.times) + term.width
-    if isinstance(term, laws.ThermalDrift):
-        return term.start, term.start + 3 * own["time_constant"]
-    half = getattr(term, "ramp", 0.0) or 1.0
-    return own["step_time"] - half, own["step_time"] + half
 
 
 def _wider(first: Range | None, second: Range) -> Range:
@@ -139,8 +114,7 @@ def ranges(model: Model, speed: Range | None, position: Range | None) -> dict[st
     values = {name: float(value) for name, value in model.parameters.items()}
     found: dict[str, Range] = {}
     for part in parts(model):
-        for coordinate, span in natural(part, values).items():
-            found[coordinate] = _wider(found.get(coordinate), span)
+        _join(found, natural(part, values))
     found["velocity"] = speed_range(model, speed)
     if position is not None:
         if not position[0] < position[1]:

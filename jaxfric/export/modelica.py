@@ -1,8 +1,8 @@
 """Modelica: a block from motion to force, the parameters with their units."""
 
 import re
+from typing import Any
 
-from .. import terms as laws
 from ..models import Model
 from .outcome import Exported, ForceError
 from .parts import Line, Part, constants, levels, lines, parts, refuse
@@ -102,13 +102,12 @@ def _evolution(part: Part) -> str:
 
 
 def _bristles(states: list[Part]) -> list[str]:
-    """F = F_p (z − sign v), and for LuGre also F_b exp(−(v/v_s)²) (z − sign v)."""
+    """Each column's weight times z − sign v."""
     products = []
     for part in states:
         lag = f"({_state(part)} - sign(v))"
-        products.append(f"{identifier(part.affine[0])} * {lag}")
-        if isinstance(part.law, laws.LuGre):
-            width = identifier(part.nonlinear[1])
-            bump = f"exp(-(v / {width}) * (v / {width}))"
-            products.append(f"{identifier(part.affine[1])} * {bump} * {lag}")
+        bristle: Any = part.term
+        weights = bristle.weights(MODELICA, *map(identifier, part.nonlinear))
+        for parameter, weight in zip(part.affine, weights, strict=True):
+            products.append(" * ".join(filter(None, (identifier(parameter), weight, lag))))
     return products

@@ -10,10 +10,9 @@ from .. import terms as laws
 from ..models import Model
 from ..terms.base import AbstractTerm, summands
 from ..terms.effects import effect_of
-from ..terms.presliding import AbstractMemory
+from ..terms.presliding import AbstractBristle, AbstractMemory
 from ..terms.time import AbstractModulated
 from ..units import spell
-from .laws import COLUMNS, FACTORS
 from .syntax import C, Syntax, identifier
 
 SAMPLED = {"position", "velocity", "time", "acceleration"}
@@ -56,7 +55,7 @@ class Part(NamedTuple):
     @property
     def remembered(self) -> bool:
         """Whether it is a bristle, whose state follows one differential equation."""
-        return isinstance(self.term, laws.Dahl | laws.LuGre)
+        return isinstance(self.term, AbstractBristle)
 
 
 class Line(NamedTuple):
@@ -126,13 +125,14 @@ def _lines(syntax: Syntax, term: AbstractTerm, affine, nonlinear) -> tuple[Line,
     if isinstance(term, laws.Directional):
         pair = [(term.positive, "+"), (term.negative, "-")]
         return _sides(syntax, pair, affine, nonlinear)
-    if isinstance(term, AbstractModulated) and type(term) in FACTORS:
-        factor = FACTORS[type(term)](syntax, term, identifier(nonlinear[0]))
-        inner = _lines(syntax, term.term, affine, nonlinear[1:])
-        return tuple(line._replace(column=f"{factor} * ({line.column})") for line in inner)
-    if type(term) not in COLUMNS:
+    if isinstance(term, AbstractModulated):
+        factor = term.factor_text(syntax, identifier(nonlinear[0]))
+        if factor is not None:
+            inner = _lines(syntax, term.term, affine, nonlinear[1:])
+            return tuple(line._replace(column=f"{factor} * ({line.column})") for line in inner)
+    columns = term.text(syntax, *map(identifier, nonlinear))
+    if columns is None:
         raise ValueError(f"{type(term).__name__} has no form in text.")
-    columns = COLUMNS[type(term)](syntax, term, *map(identifier, nonlinear))
     return tuple(Line(name, column) for name, column in zip(affine, columns, strict=True))
 
 

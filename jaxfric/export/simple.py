@@ -1,10 +1,9 @@
 """A joint with dry friction, damping and (for some) a spring: what simulators of robots know."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import terms as laws
 from ..models import Model
 from ..units import is_rotary
 from . import cost
@@ -57,7 +56,7 @@ def joint(
         constant = float(np.average(slip - level * np.sign(velocity) - slope * velocity,
                                     weights=where.weight))  # fmt: skip
         rest, given = rest - constant / stiffness, given + constant
-        sprung += [part for part in parts(model) if isinstance(part.law, laws.Offset)]
+        sprung += [part for part in parts(model) if part.law.in_joint == "constant"]
     wanted = sum(counted.values(), np.zeros_like(velocity))
     missing = _missing(model, sprung)
     bursts = sum(cost.burst(model, part) for part in missing)
@@ -96,24 +95,25 @@ def _shifted(model: Model, constant: float, rest: float) -> tuple[str, ...]:
 
 
 def _inertia(model: Model) -> list[float]:
-    held = [part for part in parts(model) if isinstance(part.law, laws.Inertia)]
+    held = [part for part in parts(model) if part.law.in_joint == "inertia"]
     return [float(model.parameters[part.affine[0]]) for part in held]
 
 
 def _spring(model: Model, wanted: bool) -> tuple[float, float, list[Part]]:
     """Stiffness, rest and parts of the spring; none where it pushes away, which no joint holds."""
     for part in parts(model):
-        if wanted and isinstance(part.term, laws.Spring):
+        if wanted and part.term.in_joint == "spring":
             stiffness = float(model.parameters[part.affine[0]])
+            spring: Any = part.term
             if stiffness > 0:
-                return stiffness, part.term.rest, [part]
+                return stiffness, spring.rest, [part]
     return 0.0, 0.0, []
 
 
 def _missing(model: Model, sprung: list[Part]) -> list[Part]:
     held = {part.key for part in sprung}
-    taken = (laws.Coulomb, laws.Viscous, laws.Inertia)
-    return [p for p in parts(model) if not isinstance(p.law, taken) and p.key not in held]
+    taken = ("friction", "damping", "inertia")
+    return [p for p in parts(model) if p.law.in_joint not in taken and p.key not in held]
 
 
 def _told(model: Model, part: Part, counted, where: cost.Motion, unit: str) -> str:
@@ -121,7 +121,7 @@ def _told(model: Model, part: Part, counted, where: cost.Motion, unit: str) -> s
     if part.key in counted:
         force = counted[part.key]
         size = f"{where.rms(force):.3g} {unit} rms, {np.max(np.abs(force)):.3g} {unit} at most"
-        taken_up = part.slips and not isinstance(part.law, laws.Offset)
+        taken_up = part.slips and part.law.in_joint != "constant"
         return f"{part.name}: {size}" + ", before the fit takes up what it can" * taken_up
     if burst := cost.burst(model, part):
         return f"{part.name}: up to {burst:.3g} {unit} around a reversal, in the worst case only"

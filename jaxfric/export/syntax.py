@@ -1,18 +1,8 @@
 """How three languages spell the same arithmetic."""
 
 import re
-from collections.abc import Mapping
-from typing import NamedTuple
 
-
-def literal(value: float) -> str:
-    """A number that reads back as the same double, with a decimal point or an exponent."""
-    return repr(float(value))
-
-
-def signed(value: float) -> str:
-    """A number to be subtracted: in parentheses if negative."""
-    return f"({literal(value)})" if value < 0 else literal(value)
+from ..terms.text import Syntax as Syntax, literal as literal, signed as signed
 
 
 def identifier(parameter: str) -> str:
@@ -20,34 +10,6 @@ def identifier(parameter: str) -> str:
     if parameter.endswith(("+", "-")):
         parameter = parameter[:-1] + ("_plus" if parameter.endswith("+") else "_minus")
     return re.sub(r"\W", "_", parameter)
-
-
-class Syntax(NamedTuple):
-    """The spelling of one language: function names, and templates where it has no function.
-
-    `power` and `choice` are templates of two and three expressions.
-    """
-
-    functions: Mapping[str, str]
-    power: str
-    choice: str
-    helpers: Mapping[str, str]
-
-    def call(self, function: str, *arguments: str) -> str:
-        """A call of `sign`, `abs`, `exp`, `sin`, `cos`, `min` or `max`."""
-        return f"{self.functions.get(function, function)}({', '.join(arguments)})"
-
-    def raised(self, base: str, exponent: str) -> str:
-        """`base` to the power of `exponent`, `base` not negative."""
-        return self.power.format(base, exponent)
-
-    def choose(self, condition: str, yes: str, no: str) -> str:
-        """One of two expressions by a condition."""
-        return self.choice.format(condition, yes, no)
-
-    def clip(self, value: str, low: str, high: str) -> str:
-        """A value held inside two limits."""
-        return self.call("min", self.call("max", value, low), high)
 
 
 C = Syntax(

@@ -7,7 +7,6 @@ from io import StringIO
 import jax.numpy as jnp
 import numpy as np
 
-from .. import terms as laws
 from ..data.recording import Recording
 from ..models import Model
 from ..units import VELOCITY, spell
@@ -36,7 +35,7 @@ def export(
     **Raises:** `ValueError` for a term that is no function of one coordinate, or whose range is
     not known.
     """
-    every = [part for part in parts(model) if not isinstance(part.law, laws.Inertia)]
+    every = [part for part in parts(model) if part.law.in_joint != "inertia"]
     further = [part for part in every if not part.slips]
     refuse([p for p in further if not p.sampled], "table", [])
     refuse([p for p in further if _coordinate(p) is None], "table", ["c and modelica"])
@@ -46,7 +45,7 @@ def export(
     for part in further:
         columns |= _beside(model, part, known, points)
     remark = [] if len(every) == len(parts(model)) else ["Inertia is no table: see the model."]
-    odd = [part.name for part in further if _odd(part)]
+    odd = [part.name for part in further if part.term.sided]
     if odd:
         remark.append(f"{', '.join(odd)}: for positive velocity; negative velocity turns the sign.")
     return Exported(_csv(columns), force_error, (), tuple(remark), known["velocity"])
@@ -62,14 +61,9 @@ def _stick(model: Model, points: int) -> dict[str, np.ndarray]:
     return {f"breakaway [{dict(model.units)['force']}]": np.repeat(pair, points)}
 
 
-def _odd(part: Part) -> bool:
-    """Whether a term is a function of place times the sign of velocity."""
-    return isinstance(part.term, laws.PositionDependentFriction | laws.StickySpot)
-
-
 def _coordinate(part: Part) -> str | None:
     """The one coordinate of a term, or `None` where there are more."""
-    if _odd(part):
+    if part.term.sided:
         return "position"
     names = set(part.term.coordinates)
     return names.pop() if len(names) == 1 else None

@@ -13,8 +13,8 @@ from .. import checks, programs, signals
 from ..data.recording import Recording, require, uniform
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
-from ..terms import TransportDelay
 from ..terms.base import summands
+from ..terms.effects import traits
 
 
 def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
@@ -61,9 +61,10 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, derived: bool) -> F
 
 def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
     """The model with a delay of zero, and its delay, s; `None` where it has none."""
-    if not any(isinstance(term, TransportDelay) for term in summands(model.term)):
+    name = next(filter(None, (traits(term).shift for term in summands(model.term))), None)
+    if name is None:
         return model, None
-    return model.with_parameters({"delay": 0.0}), model.parameters["delay"]
+    return model.with_parameters({name: 0.0}), model.parameters[name]
 
 
 def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:

@@ -6,7 +6,7 @@ for (`jaxfric.identification`), and then live beside the terms in a [`Model`][ja
 """
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar
 
 import equinox as eqx
@@ -16,7 +16,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
+from ..units import POSITION
 from .sample import Burden, Parameter, Sample, Scales, samples
+from .text import Syntax
 
 
 class AbstractTerm(eqx.Module):
@@ -28,6 +30,10 @@ class AbstractTerm(eqx.Module):
 
     stepped: ClassVar[bool] = False
     """Whether its columns are stepped along the motion several times a sample."""
+    in_joint: ClassVar[str] = ""
+    """What a simulator's joint has for it: friction, damping, inertia, spring or constant."""
+    sided: ClassVar[bool] = False
+    """Whether it is a function of the position times the direction."""
     swings: ClassVar[bool] = False
     """Whether it holds a load that swings, or strikes, faster than a wide kernel resolves."""
 
@@ -63,6 +69,21 @@ class AbstractTerm(eqx.Module):
     @abstractmethod
     def inertial(self) -> bool:
         """Whether the term has momentum, so that its force contains an acceleration."""
+
+    def text(self, s: Syntax, *names: str) -> Sequence[str] | None:
+        """Its columns at one sample in a language, `names` being those of β; `None` for no text.
+
+        The signals are `x`, `v`, `a`, `t`.
+        """
+        return None
+
+    def extent(self, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """The ranges of position and time in which it shows all that it does, where it says."""
+        waves = [p for p in self.nonlinear if p.repeats]
+        return {
+            "position" if p.dimension == POSITION else "time": (0.0, p.period(values[p.name]))
+            for p in waves
+        }
 
     @abstractmethod
     def columns(self, recording: Recording) -> Float[Array, "N p"]:

@@ -10,6 +10,7 @@ from ..units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY, Dimension
 from .base import AbstractLaw
 from .sample import Parameter, Sample
 from .table import reading
+from .text import literal
 
 UNKNOWN = float("nan")
 
@@ -29,6 +30,9 @@ class FrictionAsymmetry(AbstractLaw):
     def law(self, sample: Sample):
         return (jnp.abs(jnp.sign(sample.velocity)), jnp.abs(sample.velocity))
 
+    def text(self, s):
+        return (s.call("abs", s.call("sign", "v")), s.call("abs", "v"))
+
 
 class QuadraticDrag(AbstractLaw):
     """Turbulent drag (air, churning oil): F = c v abs(v)."""
@@ -37,6 +41,9 @@ class QuadraticDrag(AbstractLaw):
 
     def law(self, sample: Sample):
         return (sample.velocity * jnp.abs(sample.velocity),)
+
+    def text(self, s):
+        return (f"v * {s.call('abs', 'v')}",)
 
 
 class PowerLaw(AbstractLaw):
@@ -58,6 +65,10 @@ class PowerLaw(AbstractLaw):
         moving = speed > 0
         power = jnp.exp(self.exponent * jnp.log(jnp.where(moving, speed, jnp.ones_like(speed))))
         return (jnp.where(moving, jnp.sign(sample.velocity) * power, jnp.zeros_like(power)),)
+
+    def text(self, s, exponent):
+        ratio = f"{s.call('abs', 'v')} / {literal(self.unit_speed)}"
+        return (f"{s.call('sign', 'v')} * {s.raised(ratio, exponent)}",)
 
 
 def _thinning_bounds(scales):
@@ -81,6 +92,9 @@ class ShearThinning(AbstractLaw):
 
     def law(self, sample: Sample):
         return (sample.velocity / (1 + jnp.abs(sample.velocity) / self.thinning_velocity),)
+
+    def text(self, s, scale):
+        return (f"v / (1.0 + {s.call('abs', 'v')} / {scale})",)
 
 
 class LoadDependentFriction(AbstractLaw):

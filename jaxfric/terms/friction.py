@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from ..units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY
 from .base import AbstractLaw
 from .sample import Parameter, Sample
+from .text import Syntax
 
 UNKNOWN = float("nan")
 
@@ -19,19 +20,27 @@ UNKNOWN = float("nan")
 class Coulomb(AbstractLaw):
     """Friction of constant magnitude: F = Fc sign(v)."""
 
+    in_joint: ClassVar = "friction"
     affine: ClassVar = (Parameter("coulomb", FORCE),)
 
     def law(self, sample: Sample):
         return (jnp.sign(sample.velocity),)
 
+    def text(self, s):
+        return (s.call("sign", "v"),)
+
 
 class Viscous(AbstractLaw):
     """Friction proportional to speed: F = Fv v."""
 
+    in_joint: ClassVar = "damping"
     affine: ClassVar = (Parameter("viscous", DAMPING),)
 
     def law(self, sample: Sample):
         return (sample.velocity,)
+
+    def text(self, s):
+        return ("v",)
 
 
 def _stribeck_bounds(scales):
@@ -95,6 +104,11 @@ class AbstractExponentialBump(AbstractBump):
         return jnp.exp(self.fall(speed, slowest))
 
 
+def _bump(s: Syntax, shape: str) -> tuple[str]:
+    """A bump as text."""
+    return (f"{s.call('sign', 'v')} * {shape}",)
+
+
 class Gaussian(AbstractExponentialBump):
     """Stribeck bump F = F_b sign(v) exp(−(v/v_s)²) (Kim, Kim & Ha 2004, eq. 20).
 
@@ -109,6 +123,9 @@ class Gaussian(AbstractExponentialBump):
 
     def fall(self, speed, slowest):
         return (slowest - speed) * (slowest + speed) / self.stribeck_velocity**2
+
+    def text(self, s, width):
+        return _bump(s, s.call("exp", f"-(v / {width}) * (v / {width})"))
 
 
 class Lorentzian(AbstractBump):
@@ -126,6 +143,9 @@ class Lorentzian(AbstractBump):
     def contrast(self, speed, slowest):
         return (slowest - speed) * (slowest + speed) / (self.stribeck_velocity**2 + speed**2)
 
+    def text(self, s, width):
+        return (f"{s.call('sign', 'v')} / (1.0 + (v / {width}) * (v / {width}))",)
+
 
 class Exponential(AbstractExponentialBump):
     """Stribeck bump F = F_b sign(v) exp(−|v|/v_s) (Tustin 1947).
@@ -141,6 +161,9 @@ class Exponential(AbstractExponentialBump):
 
     def fall(self, speed, slowest):
         return (slowest - speed) / self.stribeck_velocity
+
+    def text(self, s, width):
+        return _bump(s, s.call("exp", f"-{s.call('abs', 'v')} / {width}"))
 
 
 class Generalised(AbstractExponentialBump):
@@ -167,3 +190,7 @@ class Generalised(AbstractExponentialBump):
     def _power(self, ratio):
         # jnp.power is an order of magnitude slower.
         return jnp.exp(self.stribeck_exponent * jnp.log(ratio))
+
+    def text(self, s, width, exponent):
+        ratio = f"{s.call('abs', 'v')} / {width}"
+        return _bump(s, s.call("exp", f"-{s.raised(ratio, exponent)}"))

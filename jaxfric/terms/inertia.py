@@ -12,6 +12,7 @@ from .sample import Parameter, Sample
 class Inertia(AbstractLaw):
     """Force that accelerates the moving mass: u = d(M v)/dt (Newton's second law)."""
 
+    in_joint: ClassVar = "inertia"
     affine: ClassVar = (Parameter("inertia", INERTIA),)
     coordinates: ClassVar = frozenset({"acceleration"})
 
@@ -21,12 +22,19 @@ class Inertia(AbstractLaw):
     def impulse(self, sample: Sample):
         return (sample.velocity,)
 
+    def text(self, s):
+        return ("a",)
+
 
 class Offset(AbstractLaw):
     """Constant force: u = F₀ (weight of a vertical axis, amplifier offset)."""
 
+    in_joint: ClassVar = "constant"
     affine: ClassVar = (Parameter("offset", FORCE),)
     coordinates: ClassVar = frozenset()
 
     def law(self, sample: Sample):
         return (jnp.ones_like(sample.velocity),)
+
+    def text(self, s):
+        return ("1.0",)

@@ -15,6 +15,7 @@ from jaxtyping import Array, Float
 from ..units import FORCE, INERTIA, POSITION, STIFFNESS, Dimension
 from .base import AbstractLaw
 from .sample import Parameter, Resolution, Sample
+from .text import TURN, literal, signed
 
 UNKNOWN = float("nan")
 POSITION_ONLY = frozenset({"position"})
@@ -110,6 +111,9 @@ class GravityUnbalance(AbstractLaw):
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.unbalance_period)
 
+    def text(self, s, period):
+        return s.waves("x", period)
+
 
 class Gravity(AbstractLaw):
     """Weight of an eccentric mass on the turning axis itself: u = G sin(2πx/L + φ), L one turn.
@@ -148,6 +152,9 @@ class Cogging(AbstractLaw):
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.pitch, self.harmonics)
 
+    def text(self, s, pitch):
+        return s.waves("x", pitch, self.harmonics)
+
 
 class Spring(AbstractLaw):
     """Linear spring: F = k (x − x₀).
@@ -157,11 +164,15 @@ class Spring(AbstractLaw):
     """
 
     rest: float = eqx.field(static=True, default=0.0)
+    in_joint: ClassVar = "spring"
     affine: ClassVar = (Parameter("stiffness", STIFFNESS),)
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
         return (sample.position - self.rest,)
+
+    def text(self, s):
+        return (f"(x - {signed(self.rest)})",)
 
 
 class HardeningSpring(AbstractLaw):
@@ -177,6 +188,10 @@ class HardeningSpring(AbstractLaw):
 
     def law(self, sample: Sample):
         return ((sample.position - self.spring_centre) ** 3,)
+
+    def text(self, s, centre):
+        away = f"(x - {centre})"
+        return (f"{away} * {away} * {away}",)
 
 
 def _upper(scales):
@@ -206,6 +221,9 @@ class EndStop(AbstractLaw):
     def law(self, sample: Sample):
         return (jnp.maximum(sample.position - self.stop_position, 0.0),)
 
+    def text(self, s, place):
+        return (s.call("max", f"x - {place}", "0.0"),)
+
 
 class LowerEndStop(AbstractLaw):
     """Elastic stop at the lower end of the stroke: F = k min(x − x_s, 0).
@@ -221,6 +239,9 @@ class LowerEndStop(AbstractLaw):
     def law(self, sample: Sample):
         return (jnp.minimum(sample.position - self.lower_stop_position, 0.0),)
 
+    def text(self, s, place):
+        return (s.call("min", f"x - {place}", "0.0"),)
+
 
 class PositionDependentFriction(AbstractLaw):
     """Coulomb level that varies along the stroke: F = A sin(2πx/L + φ) sign(v).
@@ -229,6 +250,7 @@ class PositionDependentFriction(AbstractLaw):
     """
 
     friction_period: Float[Array, ""] | float = UNKNOWN
+    sided: ClassVar = True
     affine: ClassVar = wave("friction", FORCE)
     nonlinear: ClassVar = (
         Parameter("friction_period", POSITION, _any_period, resolution=_cycles(), repeats=True),
@@ -239,6 +261,9 @@ class PositionDependentFriction(AbstractLaw):
         angle = 2 * jnp.pi * sample.position / self.friction_period
         return tuple(jnp.sign(sample.velocity) * part for part in waves(angle))
 
+    def text(self, s, period):
+        return tuple(f"{s.call('sign', 'v')} * {wave}" for wave in s.waves("x", period))
+
 
 class StickySpot(AbstractLaw):
     """Extra friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
@@ -248,6 +273,7 @@ class StickySpot(AbstractLaw):
 
     spot_position: Float[Array, ""] | float = UNKNOWN
     spot_width: Float[Array, ""] | float = UNKNOWN
+    sided: ClassVar = True
     affine: ClassVar = (Parameter("spot_force", FORCE),)
     nonlinear: ClassVar = (
         Parameter("spot_position", POSITION, _inside, logarithmic=False, resolution=_BY_WIDTH),
@@ -258,6 +284,14 @@ class StickySpot(AbstractLaw):
     def law(self, sample: Sample):
         distance = (sample.position - self.spot_position) / self.spot_width
         return (jnp.sign(sample.velocity) * jnp.exp(-0.5 * distance**2),)
+
+    def text(self, s, place, width):
+        away = f"((x - {place}) / {width})"
+        return (f"{s.call('sign', 'v')} * {s.call('exp', f'-0.5 * {away} * {away}')}",)
+
+    def extent(self, values):
+        at, reach = values["spot_position"], 4 * values["spot_width"]
+        return {"position": (at - reach, at + reach)}
 
 
 class PositionDependentInertia(AbstractLaw):
@@ -282,3 +316,9 @@ class PositionDependentInertia(AbstractLaw):
     def impulse(self, sample: Sample):
         angle = 2 * jnp.pi * sample.position / self.inertia_period
         return tuple(part * sample.velocity for part in waves(angle))
+
+    def text(self, s, period):
+        # The derivative carried out: u = M₁ a + ½ M₁′ v².
+        sine, cosine = s.waves("x", period)
+        half = f"{literal(0.5 * TURN)} / {period} * v * v"
+        return (f"(a * {sine} + {half} * {cosine})", f"(a * {cosine} - {half} * {sine})")

@@ -18,6 +18,7 @@ from ..units import FORCE, POSITION, TIME, VELOCITY
 from .base import AbstractTerm, joined, vector
 from .friction import AbstractBump, Gaussian
 from .sample import Burden, Parameter
+from .text import Syntax
 
 UNKNOWN = float("nan")
 
@@ -115,6 +116,10 @@ class AbstractBristle(AbstractMemory):
     def lagging(self, velocity: Float[Array, " N"], deflection: Float[Array, " N"]):
         """The columns at some velocities, m/s, and deflections, −1 to 1, `(N, p)`."""
 
+    def weights(self, s: Syntax, *names: str) -> tuple[str, ...]:
+        """What each column is times z − sign v, as text; empty for one."""
+        return ("",)
+
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         deflection = bristle(recording, self.presliding_distance)
         return self.lagging(recording.velocity, deflection)
@@ -160,6 +165,9 @@ class LuGre(AbstractBristle):
         lagging = deflection - jnp.sign(velocity)
         bump = jnp.exp(-((velocity / self.stribeck_velocity) ** 2))
         return jnp.stack([lagging, bump * lagging], axis=1)
+
+    def weights(self, s, distance, width):
+        return ("", s.call("exp", f"-(v / {width}) * (v / {width})"))
 
 
 def _memory_bounds(scales):

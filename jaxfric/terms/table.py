@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from ..units import FORCE
 from .base import AbstractLaw
 from .sample import Parameter, Sample
+from .text import literal, signed
 
 
 class Table(AbstractLaw):
@@ -45,6 +46,26 @@ class Table(AbstractLaw):
         values = jnp.asarray(self.knots, value.dtype)
         place = jnp.interp(value, values, jnp.arange(values.shape[0], dtype=value.dtype))
         return tuple(jnp.maximum(1 - jnp.abs(place - k), 0.0) for k in range(1, values.shape[0]))
+
+    def text(self, s):
+        if self.coordinate not in _SIGNALS:
+            return None
+        # A hat on each knot but the first, the last one going on level.
+        signal, rises, hats = _SIGNALS[self.coordinate], list(pairwise(self.knots)), []
+        for k, (low, top) in enumerate(rises):
+            up = f"({signal} - {signed(low)}) / {literal(top - low)}"
+            down = "1.0"
+            if k + 1 < len(rises):
+                high = rises[k + 1][1]
+                down = f"({signed(high)} - {signal}) / {literal(high - top)}"
+            hats.append(s.call("max", s.call("min", up, down), "0.0"))
+        return tuple(hats)
+
+    def extent(self, values):
+        return {self.coordinate: (self.knots[0], self.knots[-1])}
+
+
+_SIGNALS = {"position": "x", "velocity": "v", "time": "t"}
 
 
 def reading(sample: Sample, name: str):

@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+from numpy.polynomial import legendre
 
 from ..data.recording import Recording
 from ..units import DIMENSIONLESS, FORCE, FREQUENCY, TIME
@@ -16,6 +17,7 @@ from .inertia import Inertia, Offset
 from .position import wave, waves
 from .sample import Parameter, Resolution, Sample
 from .table import reading
+from .text import TURN, Syntax, literal, signed
 
 UNKNOWN = float("nan")
 
@@ -41,6 +43,10 @@ class AbstractModulated(AbstractTerm):
     @abstractmethod
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
         """The factor at each time, s, dimensionless."""
+
+    def factor_text(self, s: Syntax, name: str) -> str | None:
+        """The factor in a language, of the parameter's name; `None` where it has no text."""
+        return None
 
     @property
     def affine(self):
@@ -102,6 +108,13 @@ class ThermalDrift(AbstractModulated):
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
         return jnp.exp(-(time - self.start) / self.time_constant)
 
+    def factor_text(self, s, name):
+        return s.call("exp", f"-(t - {signed(self.start)}) / {name}")
+
+    def extent(self, values):
+        last = self.start + 3 * values["time_constant"]
+        return super().extent(values) | {"time": (self.start, last)}
+
 
 def _within(scales):
     """Inside the record but its first and last 2 %, where one level rests on too few samples."""
@@ -131,6 +144,15 @@ class FrictionStep(AbstractModulated):
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
         return _stepped(self, time)
+
+    def factor_text(self, s, name):
+        if self.ramp == 0:
+            return s.choose(f"t > {name}", "1.0", "0.0")
+        return s.clip(f"(t - {name}) / {literal(self.ramp)} + 0.5", "0.0", "1.0")
+
+    def extent(self, values):
+        at, half = values["step_time"], self.ramp or 1.0
+        return super().extent(values) | {"time": (at - half, at + half)}
 
 
 def _stepped(step, time):
@@ -232,6 +254,24 @@ class LoadDrift(AbstractLaw):
             polynomials.append(newer)
         return tuple(polynomials[1 : self.degree + 1])
 
+    def text(self, s):
+        tau = f"2.0 * (t - {signed(self.start)}) / {literal(self.duration)} - 1.0"
+        place = s.clip(tau, "-1.0", "1.0")
+        degrees = range(1, self.degree + 1)
+        return tuple(_horner(legendre.leg2poly([0.0] * n + [1.0]), place) for n in degrees)
+
+    def extent(self, values):
+        return {"time": (self.start, self.start + self.duration)}
+
+
+def _horner(coefficients, variable: str) -> str:
+    """A polynomial as text, the constant first."""
+    text = literal(coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        text = f"({text} * {variable}"
+        text += f" + {literal(coefficient)})" if coefficient else ")"
+    return text
+
 
 def _frequency_bounds(scales):
     """From one and a half periods in the record to half of Nyquist's frequency.
@@ -262,6 +302,10 @@ class PeriodicDisturbance(AbstractLaw):
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * self.frequency * sample.time)
 
+    def text(self, s, frequency):
+        angle = f"{literal(TURN)} * {frequency} * t"
+        return (s.call("sin", angle), s.call("cos", angle))
+
 
 class DisturbancePulses(AbstractLaw):
     """Isolated pushes: F = Σ_i A_i cos²(π (t − t_i)/(2w)) for abs(t − t_i) < w.
@@ -284,3 +328,15 @@ class DisturbancePulses(AbstractLaw):
     def law(self, sample: Sample):
         places = [jnp.clip((sample.time - at) / self.width, -1.0, 1.0) for at in self.times]
         return tuple(jnp.cos(0.5 * jnp.pi * place) ** 2 for place in places)
+
+    def text(self, s):
+        half = literal(0.25 * TURN)
+        shapes = []
+        for at in self.times:
+            place = s.clip(f"(t - {signed(at)}) / {literal(self.width)}", "-1.0", "1.0")
+            wave = s.call("cos", f"{half} * {place}")
+            shapes.append(f"{wave} * {wave}")
+        return tuple(shapes)
+
+    def extent(self, values):
+        return {"time": (min(self.times) - self.width, max(self.times) + self.width)}

@@ -76,6 +76,11 @@ def traits(term: AbstractTerm) -> Effect:
     return _OF_LAW.get(type(inner), NONE)
 
 
+def law_named(name: str) -> type[AbstractTerm] | None:
+    """The law of that name that models an effect, also of one's own; `None` where there is none."""
+    return next((law for law in _OF_LAW if law.__name__ == name), None)
+
+
 def effect_of(term: AbstractTerm) -> str | None:
     """The name of the effect that a term models; `None` where it models none."""
     return traits(term).name or None
