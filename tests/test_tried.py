@@ -28,6 +28,7 @@ WITH_A_MODEL = {
     "c": "export BAD --to c -o out.c",
     "st": "export BAD --to st -o out.st",
     "modelica": "export BAD --to modelica -o out.mo",
+    "fmu": "export BAD --to fmu -o out.fmu",
     "mujoco": "export BAD --to mujoco -o out.xml",
     "urdf": "export BAD --to urdf -o out.urdf",
     "table": "export BAD --to table -o out.csv",

@@ -317,7 +317,7 @@ def _add_export(commands) -> None:
     command.add_argument(
         "--to",
         required=True,
-        choices=("c", "st", "modelica", "mujoco", "urdf", "table"),
+        choices=("c", "st", "modelica", "fmu", "mujoco", "urdf", "table"),
         help="target",
     )
     command.add_argument(

@@ -4,6 +4,7 @@ import sys
 import textwrap
 from argparse import Namespace
 
+from ..data.io import write_bytes
 from ..export import Exported, export
 from ..models import Model
 from ..units import VELOCITY, spell
@@ -24,8 +25,13 @@ def run(arguments: Namespace) -> int:
         )
     except ValueError as error:
         raise ValueError(f"{arguments.model}: {error}") from error
-    put(arguments.out, found.text)
     alone = standard(arguments.out)
+    if not alone:
+        write_bytes(arguments.out, found.content)
+    elif found.data is None:
+        put(arguments.out, found.text)
+    else:
+        raise ValueError(f"{arguments.to} is an archive: give it a file, -o {arguments.name}.fmu.")
     head = "" if alone else f"{arguments.out}: "
     say(f"{head}{summary(found, model, arguments.to)}", file=sys.stderr if alone else sys.stdout)
     return 0

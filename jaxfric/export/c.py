@@ -21,8 +21,7 @@ def export(model: Model, name: str = "axis") -> Exported:
 
     **Raises:** `ValueError` for a name that is none in C, and for terms with memory or channels.
     """
-    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _KEYWORDS:
-        raise ValueError(f"{name!r} cannot begin a name in C: use letters, digits and _ (--name).")
+    check_name(name)
     every = parts(model)
     able = ["modelica"] if all(part.remembered for part in every if not part.sampled) else []
     refuse([part for part in every if not part.sampled], "c", able)
@@ -42,8 +41,14 @@ def export(model: Model, name: str = "axis") -> Exported:
     return Exported(text, ForceError(0.0, 0.0, 0.0, unit))
 
 
+def check_name(name: str) -> None:
+    """Raise `ValueError` for a name that no name in C can begin with."""
+    if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _KEYWORDS:
+        raise ValueError(f"{name!r} cannot begin a name in C: use letters, digits and _ (--name).")
+
+
 def _head(model: Model, name: str) -> str:
-    force, position = (_comment(dict(model.units)[key]) for key in ("force", "position"))
+    force, position = (comment(dict(model.units)[key]) for key in ("force", "position"))
     return f"""/* {name}: the force of an axis, identified by jaxfric.
  *
  * C99, no state, no allocation. Units: {force} (force), {position} (position), s (time).
@@ -55,7 +60,7 @@ def _head(model: Model, name: str) -> str:
 """
 
 
-def _comment(unit: str) -> str:
+def comment(unit: str) -> str:
     """A unit's name as it can stand in a comment."""
     return " ".join(unit.replace("*/", "* /").replace("/*", "/ *").split())
 
@@ -63,35 +68,35 @@ def _comment(unit: str) -> str:
 def _constants(values: Sequence[tuple[str, float, str]]) -> str:
     rows = [
         f"static const double {identifier(name)} = {literal(value)};"
-        f" /* {name}, {_comment(unit)} */\n"
+        f" /* {name}, {comment(unit)} */\n"
         for name, value, unit in values
     ]
     return "".join(rows)
 
 
 def _friction(model: Model, name: str, slip: list[Part]) -> str:
-    unit = _comment(dict(model.units)["force"])
+    unit = comment(dict(model.units)["force"])
     return f"""/* Friction in slip, {unit}. At velocity 0, the constant terms alone. */
 double {name}_friction(double velocity)
 {{
     const double v = velocity;
     double u = 0.0;
 
-{_body(slip)}    (void)v;
+{body(slip)}    (void)v;
     return u;
 }}
 """
 
 
 def _force(model: Model, name: str, rest: list[Part]) -> str:
-    unit = _comment(dict(model.units)["force"])
+    unit = comment(dict(model.units)["force"])
     return f"""/* The force that a motion needs, {unit}: friction and all the other terms. */
 double {name}_force(double position, double velocity, double acceleration, double time)
 {{
     const double x = position, v = velocity, a = acceleration, t = time;
     double u = {name}_friction(velocity);
 
-{_body(rest)}    (void)x, (void)v, (void)a, (void)t;
+{body(rest)}    (void)x, (void)v, (void)a, (void)t;
     return u;
 }}
 """
@@ -102,7 +107,7 @@ def _stick(model: Model, name: str) -> list[str]:
     known = {key: identifier(key) for key, _, _ in levels(model)}
     if not known:
         return []
-    unit, tiny = _comment(dict(model.units)["force"]), "2.3e-162"
+    unit, tiny = comment(dict(model.units)["force"]), "2.3e-162"
     low = known.get("breakaway-", f"{name}_friction(-{tiny})")
     high = known.get("breakaway+", f"{name}_friction({tiny})")
     return [
@@ -115,7 +120,8 @@ double {name}_stick(double applied)
     ]
 
 
-def _body(some: list[Part]) -> str:
+def body(some: list[Part]) -> str:
+    """The statements that add the force of some summands to `u`."""
     return "".join(f"    /* {part.name} */\n{_statements(lines(C, part))}" for part in some)
 
 

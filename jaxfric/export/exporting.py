@@ -5,14 +5,14 @@ import re
 import numpy as np
 
 from ..models import Model, require
-from . import c, cost, modelica, mujoco, st, table, urdf
+from . import c, cost, fmu, modelica, mujoco, st, table, urdf
 from .cost import Range
 from .outcome import Exported
 from .parts import divisors
 
-_EXACT = {"c": c.export, "modelica": modelica.export, "st": st.export}
+_EXACT = {"c": c.export, "modelica": modelica.export, "st": st.export, "fmu": fmu.export}
 _RANGED = {"mujoco": mujoco.export, "urdf": urdf.export, "table": table.export}
-TARGETS = ("c", "st", "modelica", "mujoco", "urdf", "table")
+TARGETS = ("c", "st", "modelica", "fmu", "mujoco", "urdf", "table")
 
 
 def export(

@@ -27,6 +27,7 @@ class Exported(NamedTuple):
     - `remarks`: what the reader of the file should know.
     - `speed`: the range (lowest, highest) of the speed that the error is counted over, or `None`
       where the form is exact at every speed.
+    - `data`: the content of the file where that is no text: the archive of an FMU.
     """
 
     text: str
@@ -34,3 +35,9 @@ class Exported(NamedTuple):
     left_out: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     speed: tuple[float, float] | None = None
+    data: bytes | None = None
+
+    @property
+    def content(self) -> bytes:
+        """The content of the file."""
+        return self.text.encode() if self.data is None else self.data
