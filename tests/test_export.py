@@ -493,7 +493,7 @@ def test_the_command_writes_a_file_and_says_the_cost(saved, target, tmp_path, ca
     out = tmp_path / "out.txt"
     assert main(["export", saved, "--to", target, "-o", str(out)]) == 0
     printed = capsys.readouterr()
-    assert out.read_text("utf-8") == export(stribeck(), target).text
+    assert out.read_bytes() == export(stribeck(), target).content
     assert str(out) in printed.out and "force error" in printed.out and printed.err == ""
 
 
