@@ -157,6 +157,38 @@ def test_the_types_are_declared():
     assert done.stdout.strip() == "True"
 
 
+# ---- completion ----
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "tcsh"])
+def test_a_shell_completes_commands_options_and_names(shell, capsys):
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit) as stop:
+        main(["--print-completion", shell])
+    script = capsys.readouterr().out
+    assert stop.value.code == 0
+    for word in ("identify", "fleet", "holdout", "modelica", "symmetric-gaussian", "cogging"):
+        assert word in script
+
+
+def test_bash_takes_the_script(tmp_path, capsys):
+    pytest.importorskip("shtab")
+    with pytest.raises(SystemExit):
+        main(["--print-completion", "bash"])
+    ask = "COMP_WORDS=(jaxfric expl); COMP_CWORD=1; _shtab_jaxfric; echo ${COMPREPLY[@]}"
+    script = tmp_path / "script"
+    script.write_text(f"{capsys.readouterr().out}\n{ask}\n", "utf-8")
+    done = subprocess.run(["bash", str(script)], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["explain"]
+
+
+def test_without_shtab_the_extra_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "shtab", None)
+    with pytest.raises(SystemExit) as stop:
+        main(["--print-completion", "bash"])
+    assert stop.value.code == 2 and "jaxfric[completion]" in capsys.readouterr().err
+
+
 # ---- progress ----
 
 

@@ -16,6 +16,7 @@ from io import TextIOWrapper
 from pathlib import Path
 
 from . import options
+from .completion import SHELLS, Completion
 from .examples import EXAMPLES
 
 
@@ -139,6 +140,14 @@ def _parser() -> argparse.ArgumentParser:
         epilog="JAXFRIC_CACHE: folder for compiled programs, or off.",
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    parser.add_argument(
+        "--print-completion",
+        action=Completion,
+        choices=SHELLS,
+        metavar="SHELL",
+        help="print what makes bash, zsh or tcsh complete commands, options and names "
+        '(extra: completion); in ~/.bashrc: eval "$(jaxfric --print-completion bash)"',
+    )
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (
         _add_demo,

@@ -77,7 +77,9 @@ def select(recording: Recording, path: str) -> Selection:
     """The standings of all named models on one recording."""
     from ..identification.selection import select as select_model
 
-    with kept_in(programs_folder()):
+    show_progress("")
+    with kept_in(programs_folder()), working(f"selecting for {path}") as doing:
+        doing(f"{len(known.names())} models, each judged on samples that it was not fitted to")
         try:
             return select_model(recording)
         except ValueError as error:
@@ -88,16 +90,13 @@ def selection(arguments: Namespace) -> int:
     """`jaxfric select`: which friction model each recording supports."""
     done, failures = [], 0
     for path in arguments.files:
-        show_progress(path)
         try:
             recording, _ = read(path, arguments)
             found = select(recording, path)
         except (ValueError, OSError) as error:
-            show_progress("")
             say(f"jaxfric select: {message(error)}", file=sys.stderr)
             failures += 1
             continue
-        show_progress("")
         done.append({"file": path} | found.to_dict())
         if not _printed(arguments):
             say(

@@ -6,15 +6,16 @@ from pathlib import Path
 from ..data.io import write_text
 from ..validation import proof
 from . import _configure
+from .commands import working
 from .options import say
 
 
 def run(arguments: Namespace) -> int:
     """Do what is left of the cases, score all, print the short table, write the report."""
     folder, size = Path(arguments.out), arguments.size
-    cases = proof.run(
-        folder, arguments.cases, arguments.seed, size, arguments.jobs, _configure, arguments.limit
-    )
+    options = (arguments.cases, arguments.seed, size, arguments.jobs, _configure, arguments.limit)
+    with working(f"proving in {folder}") as doing:
+        cases = proof.run(folder, *options, doing)
     scores = proof.scores(folder, cases)
     try:
         pictures, missing = proof.draw(scores, folder), ""

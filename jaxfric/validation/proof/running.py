@@ -1,7 +1,6 @@
 """Doing the cases of a proof in several processes, and those only that have not been done."""
 
 import functools
-import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,19 +25,21 @@ def run(
     jobs: int = 1,
     prepare: Callable[[], object] | None = None,
     limit: float = LIMIT,
+    doing: Callable[[str], object] = lambda text: None,
 ) -> list[Case]:
     """Do what is left to do of a proof in a folder; returns its cases.
 
     **Arguments:** `cases`, `seed`, `size`: as [`plan`][jaxfric.validation.proof.plan] takes them;
     `jobs`: processes; `prepare`: called in each of them first, to configure jax; `limit`: seconds
-    after which a case is given up. One that is given up, or whose process dies twice, has an answer
-    that says so.
+    after which a case is given up; `doing`: is told how far it is. A case that is given up, or
+    whose process dies twice, has an answer that says so.
 
     **Raises:** `ValueError` if the folder holds a proof of another seed or size.
     """
     planned = plan(cases, seed, size)
     claim(folder, {"seed": seed, "size": list(size)})
-    do_all(folder, planned, functools.partial(trial, folder=folder), jobs, prepare, limit)
+    do = functools.partial(trial, folder=folder)
+    do_all(folder, planned, do, jobs, prepare, limit, doing)
     return planned
 
 
@@ -49,22 +50,20 @@ def do_all(
     jobs: int = 1,
     prepare: Callable[[], object] | None = None,
     limit: float = LIMIT,
+    doing: Callable[[str], object] = lambda text: None,
 ) -> None:
     """Do each case that has no answer in a folder yet; what `do` cannot answer is answered here."""
     for part in (SEALED, ANSWERS):
         (folder / part).mkdir(exist_ok=True)
     left = [case for case in cases if not path(folder, ANSWERS, case).is_file()]
-    start, shown = time.monotonic(), sys.stderr.isatty()
+    start, done = time.monotonic(), len(cases) - len(left)
+    doing(f"{done}/{len(cases)} cases")
     for number, (case, reason, seconds, _) in enumerate(work(left, do, jobs, limit, prepare), 1):
         if reason is not None and not path(folder, ANSWERS, case).is_file():
             answer = failed(reason) | {"seconds": seconds, "case": case.name, "code": fingerprint()}
             write_text(path(folder, ANSWERS, case), to_json(answer))
-        if shown:
-            pace = _span((time.monotonic() - start) / number * (len(left) - number))
-            text = f"{len(cases) - len(left) + number}/{len(cases)} cases, {pace} left"
-            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
-    if shown:
-        print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+        pace = _span((time.monotonic() - start) / number * (len(left) - number))
+        doing(f"{done + number}/{len(cases)} cases, {pace} left")
 
 
 def claim(folder: Path, about: dict) -> None:
