@@ -2,7 +2,7 @@
 
 import os
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,12 +12,12 @@ from ..data.provenance import sha256
 from ..data.recording import Recording
 from ..data.tables import load
 from ..explanation import Explanation, explain
+from ..explanation.sanity import Check, Looked, Part, look
 from ..export.patch import Patch, patch
 from ..identification import documents, tabulate
 from ..programs import kept_in
 from ..report import page, robot
 from ..simulators import Mujoco
-from ..simulators.inverse import Along
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..simulators.patching import folder_of, patched
 from .commands import programs_folder, put, read, today, working
@@ -85,13 +85,21 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     source: str | Path = arguments.mujoco
     found: list[Joint] = []
     corrected: tuple[str, ...] = ()
-    shared: dict[bytes, Along] = {}
+    shared: dict[bytes, Any] = {}
+    hinges = {name: is_hinge(mujoco, model, joints.index(name)) for name in joints}
     with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
+        doing("signs, zeros, clocks and limits of all joints")
+        opened = {
+            name: _opened(name, shared, logs, columns, arguments, hinges[name]) for name in chosen
+        }
+        looked = _looked(opened)
         for name in reversed(chosen):
             doing(f"joint {name}")
-            hinge = is_hinge(mujoco, model, joints.index(name))
-            one = _joint(name, source, shared, logs, columns, arguments, hinge)
-            found.insert(0, one._replace(corrected=corrected))
+            one = _joint(opened[name], looked.get(name), source, shared, arguments)
+            said = [
+                f"{c.attribute} at {float(c.value.value):.5g}" for c in _of_others(name, looked)
+            ]
+            found.insert(0, one._replace(corrected=(*said, *corrected)))
             if bodies := _bodies(one):
                 changed = patched(mujoco, source, bodies, folder_of(arguments.mujoco))
                 source = changed.text
@@ -104,22 +112,70 @@ def _columns(path: str, joints: list[str], arguments: Namespace) -> dict[str, di
     return columns_of(load(Path(path)).columns, joints, arguments.columns, path)
 
 
-def _joint(name: str, source, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
+def _opened(name: str, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
+    """One joint's recordings and simulator, not explained yet."""
     logs, notes = [], list[str]()
     try:
-        simulator = Mujoco(source, name, folder_of(arguments.mujoco), shared)
+        simulator = Mujoco(arguments.mujoco, name, shared=shared)
         for path, own in zip(paths, columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)
             logs.append(log)
             notes += more
-        told = explain(
-            logs[0], simulator, logs[1] if len(logs) > 1 else None, simulate=arguments.simulate
-        )
     except ValueError as error:
-        text = message(error)
-        prefix = "" if text.startswith(tuple(paths)) else f"{paths[0]}: "
-        return Joint(name, None, f"{prefix}{text}", logs, None, notes)
-    return Joint(name, told, "", logs, simulator, notes)
+        return Joint(name, None, _refusal(error, paths), logs, None, notes)
+    return Joint(name, None, "", logs, simulator, notes)
+
+
+def _refusal(error: ValueError, paths: Sequence[str]) -> str:
+    text = message(error)
+    return text if text.startswith(tuple(paths)) else f"{paths[0]}: {text}"
+
+
+def _looked(opened: Mapping[str, Joint]) -> dict[str, Looked]:
+    """What all joints' logs differ in from the simulator that no physics is."""
+    able = [joint for joint in opened.values() if joint.simulator is not None]
+    parts = [
+        Part(
+            joint.logs[0],
+            joint.logs[1] if len(joint.logs) > 1 else None,
+            joint.simulator,
+            joint.name,
+        )
+        for joint in able
+    ]
+    try:
+        return {part.name: own for part, own in zip(parts, look(parts), strict=True)}
+    except ValueError:  # a joint that does not move is told of by itself
+        return {}
+
+
+def _of_others(name: str, looked: Mapping[str, Looked]) -> list[Check]:
+    """What is wrong elsewhere that this joint's simulator is judged with: zeros of other joints."""
+    own = looked.get(name)
+    checks = own.checks if own is not None else []
+    return [
+        c
+        for c in checks
+        if c.effect == "position_zero" and c.wrong and c.parameter != f"{name} zero"
+    ]
+
+
+def _joint(joint: Joint, looked: Looked | None, source, shared, arguments: Namespace) -> Joint:
+    """One joint explained, its bodies as they were corrected by those farther out."""
+    if joint.simulator is None:
+        return joint
+    logs = joint.logs
+    held = logs[1] if len(logs) > 1 else None
+    try:
+        zeros = looked.faults.zeros if looked is not None else {}
+        simulator = Mujoco(source, joint.name, folder_of(arguments.mujoco), shared, zeros)
+        baseline = simulator if looked is None else looked.standing_on(simulator)
+        told = explain(logs[0], baseline, held, simulate=arguments.simulate)
+    except ValueError as error:
+        return joint._replace(error=_refusal(error, [log.source for log in logs]))
+    if looked is not None and looked.changed:
+        logs = [log for log in (looked.part.recording, looked.part.holdout) if log is not None]
+    return joint._replace(told=told, simulator=simulator, logs=logs)
 
 
 def _log(
@@ -186,14 +242,25 @@ def _row(joint: Joint) -> dict[str, Any]:
     return {
         "joint": joint.name,
         "verdict": joint.told.verdict,
-        "findings": [_said(finding) for finding in joint.told.findings],
+        "findings": [*_severe(joint.told), *map(_said, joint.told.findings)],
         "filtered_force_error": errors["filtered_force_error"],
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
         "corrected_before": list(joint.corrected),
     }
 
 
+def _severe(told: Explanation) -> list[str]:
+    """What nothing can be named beside."""
+    return [each["text"] for each in told.warnings if each["severe"]]
+
+
+# Findings that are put right before any physics, and say so in a sentence.
+LOOKED_AT = ("position_zero", "clock", "force_limit")
+
+
 def _said(finding) -> str:
+    if finding.effect in LOOKED_AT:
+        return finding.sentence
     if finding.effect == "parameter_mismatch":
         return finding.sentence.removeprefix("Wrong in the simulator: ").rpartition("; ")[0]
     return finding.effect.replace("_", " ")

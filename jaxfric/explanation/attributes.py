@@ -100,7 +100,13 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
     if name == CONSTANT:
         return f"a constant force of {said}, for which it has no attribute"
     if name == GAIN:
-        return f"the recorded force is {said} times the simulator's"
+        size = quantity(Estimate(abs(m.value), m.standard_error, ""))
+        if m.value < 0:
+            return (
+                f"the recorded force is counted the other way, and is {size} times the "
+                "simulator's (--scale force=-1)"
+            )
+        return f"the recorded force (the torque constant) is {size} times the simulator's"
     if name.endswith("/gear"):
         return f"{own[GAIN].owner}: gear {m.before:.4g} → {said}"
     if name in own:

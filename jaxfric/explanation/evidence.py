@@ -20,8 +20,8 @@ import numpy as np
 
 from .. import programs, signals
 from ..data.recording import Recording, pad
-from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST
-from ..terms.base import AbstractTerm
+from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, channels_of
+from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
@@ -80,6 +80,12 @@ class Evidence(NamedTuple):
         """Rows of a term's columns at many β, `(G, d)` to `(G, J, p)`."""
         if not len(term.affine):
             return np.zeros((len(betas), len(self.target), 0))
+        if isinstance(term, KnownColumns):
+            return np.repeat(self._known(term)[None], len(betas), axis=0)
+        if any(isinstance(part, KnownColumns) for part in summands(term)):
+            # Each by itself: nothing is compiled for the names of a simulator's parameters.
+            apart = [self.columns(part, np.zeros((len(betas), 0))) for part in summands(term)]
+            return np.concatenate(apart, axis=2)
         parts = []
         most = STEPPED if term.stepped else BATCH
         for start in range(0, len(betas), most):
@@ -90,6 +96,15 @@ class Evidence(NamedTuple):
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
         return np.concatenate(parts).transpose(0, 2, 1)
+
+    def _known(self, term: KnownColumns) -> np.ndarray:
+        """Rows of what a simulator says its parameters add, `(J, p)`."""
+        channels = self.motion.channels
+        pairs = [channels_of(i) for i in range(len(term.names))]
+        plain, momentum = (
+            np.stack([channels[n] for n in some]) for some in zip(*pairs, strict=True)
+        )
+        return self.project(plain, momentum).T
 
     def with_channels(self, **channels: np.ndarray) -> "Evidence":
         """The same with more signals at the nodes, each `(M,)`."""

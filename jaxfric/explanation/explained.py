@@ -99,6 +99,8 @@ class Explanation:
       `severe`: then what would be said beside it is certain to be wrong.
     - `holdout_model`: the model as it stands on the held-out recording: `model`, but for waves at
       their phase there and without what belongs to a moment (`fit["holdout_adjusted"]` says which).
+    - `sanity`: what was looked at before any physics where the baseline is a simulator, a row each
+      with `check`, whether it is `wrong`, `value` and `text`.
 
     `fit["force_error"]` is `jf.predict(model, recording)` and a subtraction, as `force_error` in
     `jaxfric.simulation.prediction`; `fit["filtered_force_error"]` the same through the kernel by
@@ -119,6 +121,7 @@ class Explanation:
     curves: dict[str, Any] = dataclasses.field(default_factory=dict, repr=False)
     warnings: list[dict[str, Any]] = dataclasses.field(default_factory=list)
     holdout_model: Model | None = None
+    sanity: list[dict[str, Any]] = dataclasses.field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """The explanation as plain data (schema `jaxfric.explanation/1`)."""
@@ -135,6 +138,7 @@ class Explanation:
             },
             "verdict": self.verdict,
             "warnings": self.warnings,
+            **({"sanity": self.sanity} if self.sanity else {}),
             "summary": self.summary,
             "where": self.where,
             "findings": [

@@ -17,7 +17,7 @@ from ..simulators import AbstractSimulator, Known, same_motion
 from ..terms import KNOWN, KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
-from . import parameters as spelled, threads, verification
+from . import parameters as spelled, sanity, threads, verification
 from .attributes import in_own_words
 from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
 from .contest import Contest, contest
@@ -82,6 +82,12 @@ def explain(
     for other in (holdout, known):
         if isinstance(other, Recording):
             check_same_units(recording, other)
+    baseline = _simulator(recording, baseline, holdout)
+    looked = None
+    if isinstance(baseline, AbstractSimulator):
+        doing("looking at signs, zeros, clocks and limits")
+        baseline = looked = sanity.looked_at(recording, baseline, holdout)
+        recording, holdout = looked.logs(recording, holdout)
     own = baseline.attributes() if isinstance(baseline, AbstractSimulator) else {}
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
     if isinstance(baseline, Earlier):
@@ -94,6 +100,7 @@ def explain(
     # A few thousand rows: single precision would save nothing.
     with jax.enable_x64(True), threads.single():
         held, remarks = None if theirs is None else cast(theirs), [*remarks, *more]
+        remarks = remarks if looked is None else looked.remarks(remarks)
         told = _explain(
             cast(ours), cast(baseline), held, figures, remarks, fixed, simulate, seed, doing
         )
@@ -107,7 +114,22 @@ def explain(
         values[name] = values[name]._replace(value=np.float64(np.nan))
     held_out = None if holdout is None else facts(holdout)
     told = dataclasses.replace(told, **models, baseline_parameters=values, holdout=held_out)
-    return in_own_words(told, own) if own else told
+    told = in_own_words(told, own) if own else told
+    return told if looked is None else sanity.told(told, looked, figures.x64)
+
+
+def _simulator(recording: Recording, baseline, holdout: Recording | None):
+    """The baseline, as a simulator where it gives another program's force along this motion."""
+    if isinstance(baseline, Recording) and holdout is None and same_motion(recording, baseline):
+        return Known(baseline.force)
+    if any(
+        baseline is make for make in NAMED.values()
+    ):  # the function that makes a model, not called
+        return baseline()
+    given_as = type | Model | Identified | AbstractTerm | AbstractSimulator
+    return (
+        Known(baseline) if callable(baseline) and not isinstance(baseline, given_as) else baseline
+    )
 
 
 def _as_seen(model: Model, recording: Recording) -> Model:
@@ -120,15 +142,6 @@ def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bo
     """The recordings with another simulator's force where the baseline stands on one, and the
     baseline as a model of corrections to it, which stay zero unless they are found wrong.
     """
-    if isinstance(baseline, Recording) and holdout is None and same_motion(recording, baseline):
-        baseline = Known(baseline.force)
-    if any(
-        baseline is make for make in NAMED.values()
-    ):  # the function that makes a model, not called
-        baseline = baseline()
-    given_as = type | Model | Identified | AbstractTerm | AbstractSimulator
-    if callable(baseline) and not isinstance(baseline, given_as):
-        baseline = Known(baseline)
     if isinstance(baseline, AbstractSimulator):
         held = None if holdout is None else baseline.beside(holdout, held_out=True)
         recording = baseline.beside(recording)
@@ -201,6 +214,8 @@ def _explain(
     wrong = None
     if any(remark.severe for remark in remarks):
         found = _nothing(asked)
+        if known.model is not None and fixed:
+            found = _as_given(known.model, found, asked, ())
         rest = asked, found
     else:
         doing("looking for what is missing, and whether it holds")

@@ -13,7 +13,6 @@ from ..explanation.attributes import CONSTANT, GAIN, MISMATCH
 from ..explanation.errors import through_kernel
 from ..models import Model
 from ..simulators import Mujoco
-from ..simulators.inverse import Along
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
@@ -92,7 +91,7 @@ def patch(
         for joint, model in models.items()
     ]
     errors = {}
-    shared: dict[bytes, Along] = {}
+    shared: dict[bytes, Any] = {}
     for joint, told in found.items():
         pair = (
             Mujoco(source, joint, shared=shared),

@@ -247,7 +247,19 @@ def explained(document: Mapping[str, Any]) -> list[Block]:
         said += [f"Run forward: velocity error {motion['before']:.2%} before, {after} after."]
     baseline = [f"baseline {document['baseline']['name']}"]
     findings = [_finding(finding) for finding in document["findings"]]
-    return [source, baseline, said, *findings, *_places(document)]
+    return [source, baseline, said, *_sanity(document), *findings, *_places(document)]
+
+
+def _sanity(document: Mapping[str, Any]) -> list[Block]:
+    """What was looked at before any physics; what of it is a finding is said there."""
+    rows = document.get("sanity") or []
+    named = {finding["effect"] for finding in document["findings"]}
+    wrong = [row["text"] for row in rows if row["wrong"] and row["check"] not in named]
+    right = sorted({row["check"].replace("_", " ") for row in rows if not row["wrong"]})
+    lines = [f"looked at first: {text}" for text in wrong]
+    if right:
+        lines.append(f"looked at first, and right: {', '.join(right)}")
+    return [lines] if lines else []
 
 
 def _finding(finding: Mapping[str, Any]) -> list[str]:

@@ -83,7 +83,7 @@ def cards(document, curves, units, terms) -> list[dict[str, Any]]:
                 "equation": finding.get("equation") or "",
                 "formula": formula,
                 "chart": charts.finding(shown[number], units["force"])
-                if number < len(shown)
+                if number < len(shown) and shown[number]
                 else None,
                 "parameters": _told(finding.get("parameters") or {}),
                 "facts": facts,
@@ -142,6 +142,14 @@ def places_note(document: Mapping[str, Any]) -> str:
     chances = [p["p_value"] for p in document.get("where") or () if p.get("p_value") is not None]
     text = "Coordinates with which the residual of the baseline goes; one cause shows over several."
     return f"{text} Each is beyond chance (p ≤ {max(chances):.2g})." if chances else text
+
+
+def sanity(document: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """What was looked at before any physics: what, whether it is wrong, and in words."""
+    return [
+        (spoken(row["check"]), "wrong" if row["wrong"] else "", row["text"])
+        for row in document.get("sanity") or ()
+    ]
 
 
 def hidden(document: Mapping[str, Any]) -> list[tuple[str, ...]]:

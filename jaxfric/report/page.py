@@ -102,6 +102,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "next": advice.steps(document),
         "cards": content.cards(document, curves, units, terms),
         "places": content.places(document),
+        "sanity": content.sanity(document),
         "places_note": content.places_note(document),
         "terms": terms,
         "unseen": ", ".join(unseen),
@@ -120,7 +121,8 @@ def _pictures(document, curves, units: Mapping[str, str]) -> dict[str, Any]:
     if not document.get("findings"):  # the improved model is the baseline
         curves = _unchanged(curves)
     force, position = units["force"], units["position"]
-    own, places = list(curves.get("findings") or ()), list(curves.get("map") or ())
+    own = [each for each in curves.get("findings") or () if each]
+    places = list(curves.get("map") or ())
     time, held = curves.get("time"), curves.get("holdout")
     friction = curves.get("friction")
     friction = charts.friction(friction, force, position) if friction else None

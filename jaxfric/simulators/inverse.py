@@ -48,6 +48,16 @@ def along(mujoco: Any, model: Any, motion: Motion) -> Along:
     return Along(force, rest, momentum, friction, motion, frames)
 
 
+def forces(mujoco: Any, model: Any, motion: Motion) -> np.ndarray:
+    """The inverse dynamics alone, `(N, dof)`."""
+    data, found = mujoco.MjData(model), np.empty(motion.position.shape)
+    for i in range(len(found)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = (part[i] for part in motion)
+        mujoco.mj_inverse(model, data)
+        found[i] = data.qfrc_inverse
+    return found
+
+
 def sum_of_bodies(mujoco: Any, model: Any, frames) -> tuple[np.ndarray, np.ndarray]:
     """Rest and momentum of all bodies, `(N, dof)` each."""
     parts = [

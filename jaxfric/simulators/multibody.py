@@ -2,8 +2,9 @@
 
 import dataclasses
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,9 +18,12 @@ from ..terms.base import Sum
 from . import columns, inverse
 from .known import AbstractSimulator, Attribute, along
 from .loading import joints_of, library, read
+from .touching import alone, at_limit, touching
 
 # Of a limit that is reached, what rounding and the solver leave.
 ROUNDING = 1e-6
+# Bodies that touch in most of a motion are drawn too large: that is no event of the motion.
+MOSTLY = 0.5
 
 
 class Mujoco(AbstractSimulator):
@@ -34,7 +38,10 @@ class Mujoco(AbstractSimulator):
     **Arguments:** `model`: a file (MJCF or URDF) or its text; `joint`: name of the joint that the
     recording is of, where there are several. The positions of the others are channels of the
     recording by their joints' names, in the model's own units, rad or m; `folder`, in which the
-    meshes of a model that is given as text lie; `shared`, a memory for several joints of one log.
+    meshes of a model that is given as text lie; `shared`, a memory for several joints of one log;
+    `zeros`, where the encoders' zeros are in the model's angles, rad or m by joint.
+
+    Nothing is compared where the joint is at a limit of the model, or bodies of it touch.
 
     **Raises:** `ValueError` for a model that MuJoCo cannot read, for free and ball joints, closed
     loops, and a joint or channel that is not there.
@@ -45,12 +52,19 @@ class Mujoco(AbstractSimulator):
         model: str | Path,
         joint: str | None = None,
         folder: Path | None = None,
-        shared: dict[bytes, inverse.Along] | None = None,
+        shared: dict[bytes, Any] | None = None,
+        zeros: Mapping[str, float] | None = None,
     ):
-        self.mujoco, self._source = library(), str(model)
+        self.mujoco, self._source, self._folder = library(), str(model), folder
         self._shared = {} if shared is None else shared
         self.model = read(self.mujoco, model, folder)
         self.joints = joints_of(self.mujoco, self.model)
+        alone(self.mujoco, self.model)
+        self.zeros = dict(zeros or {})
+        shift = np.array([self.zeros.get(name, 0.0) for name in self.joints])
+        self.model.qpos0[:] += shift
+        self.model.qpos_spring[:] += shift
+        self.model.jnt_range[:] += shift[:, None]
         if joint is None and len(self.joints) > 1:
             raise ValueError(
                 f"The model has {len(self.joints)} joints: {', '.join(self.joints)}. Say which one "
@@ -81,28 +95,90 @@ class Mujoco(AbstractSimulator):
 
     def beside(self, recording: Recording, held_out: bool = False) -> Recording:
         """The recording with the model's force and what each parameter adds, as channels."""
+        key = f"beside {self.joint}".encode() + self._key(recording)
+        if key not in self._shared:
+            self._shared[key] = self._channels(recording)
+        force, sound = self._shared[key]
+        known = along(recording, force, held_out)
+        # Where the other joints are is in the force; by their names programs would differ.
+        kept = {name: each for name, each in known.channels.items() if name not in self.joints}
+        return dataclasses.replace(known, channels=kept | sound)
+
+    def _channels(self, recording: Recording):
+        """The force, NaN where nothing is compared, and what stands beside it by channel."""
         seen, own = self.along(recording), self.number
         found = {KNOWN_REST: seen.rest[:, own], KNOWN_MOMENTUM: seen.momentum[:, own]}
         for number, parts in enumerate(self.columns.along(seen)):
             found |= dict(zip(channels_of(number), parts, strict=True))
-        force = np.where(self._sticks(seen), np.nan, seen.force[:, own])
-        known = along(recording, force, held_out)
+        gone = self._sticks(seen) | self.limited(recording)
+        if np.mean(touches := self.touches(recording)) < MOSTLY:
+            gone |= touches
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
-        return dataclasses.replace(known, channels=known.channels | sound)
+        return np.where(gone, np.nan, seen.force[:, own]), sound
+
+    def limited(self, recording: Recording) -> Bool[np.ndarray, " N"]:
+        """Where the joint is at a limit of the model, `(N,)`."""
+        place = self.along(recording).motion.position[:, self.number]
+        return at_limit(self.model, self.number, place)
+
+    def touches(self, recording: Recording) -> Bool[np.ndarray, " N"]:
+        """Where bodies of the model touch, `(N,)`."""
+        key = b"touches" + self._key(recording)
+        if key not in self._shared:
+            motion = self.along(recording).motion
+            self._shared[key] = touching(self.mujoco, self.model, motion)
+        return self._shared[key]
 
     def along(self, recording: Recording) -> inverse.Along:
         """What the model says of all joints along a recorded motion."""
-        logs = [self._position(recording, name) for name in self.joints]
-        places = [np.asarray(log.position).tobytes() for log in logs]
-        source = self._source.encode()
-        key = hashlib.sha256(
-            b"".join([source, *places, np.asarray(logs[0].time).tobytes()])
-        ).digest()
+        key = b"along" + self._key(recording)
         if key not in self._shared:
-            parts = np.array([derived(log) for log in logs])
-            motion = inverse.Motion(*np.moveaxis(parts, 0, -1))
-            self._shared[key] = inverse.along(self.mujoco, self.model, motion)
+            logs = [self._position(recording, name) for name in self.joints]
+            place = b"motion" + self._places(logs)
+            if place not in self._shared:
+                parts = np.array([derived(log) for log in logs])
+                self._shared[place] = inverse.Motion(*np.moveaxis(parts, 0, -1))
+            self._shared[key] = inverse.along(self.mujoco, self.model, self._shared[place])
         return self._shared[key]
+
+    def _key(self, recording: Recording) -> bytes:
+        """What the force along a motion depends on."""
+        logs = [self._position(recording, name) for name in self.joints]
+        zeros = repr(sorted(self.zeros.items()))
+        own = hashlib.sha256(f"{self._source} {zeros}".encode()).digest()
+        return own + self._places(logs)
+
+    @staticmethod
+    def _places(logs: list[Recording]) -> bytes:
+        places = [np.asarray(log.position).tobytes() for log in logs]
+        return hashlib.sha256(b"".join([*places, np.asarray(logs[0].time).tobytes()])).digest()
+
+    def moved(
+        self, recording: Recording, zeros: Mapping[str, float], index: np.ndarray
+    ) -> Float[np.ndarray, " n"]:
+        """The force at some samples if the encoders' zeros were elsewhere, rad or m by joint."""
+        key = f"moved {sorted(zeros.items())} {len(index)}".encode() + self._key(recording)
+        if key not in self._shared:
+            motion = self.along(recording).motion
+            shift = np.array([zeros.get(name, 0.0) for name in self.joints])
+            at = inverse.Motion(*(part[index] for part in motion))
+            at = at._replace(position=at.position - shift)
+            self._shared[key] = inverse.forces(self.mujoco, self.model, at)
+        return self._shared[key][:, self.number]
+
+    def turned(
+        self, recording: Recording, order: Sequence[int], signs: np.ndarray, index: np.ndarray
+    ) -> Float[np.ndarray, "n dof"]:
+        """The forces of all joints at some samples if the positions were in another order, or
+        counted the other way.
+        """
+        motion = self.along(recording).motion
+        at = inverse.Motion(*(signs * part[index][:, list(order)] for part in motion))
+        return inverse.forces(self.mujoco, self.model, at)
+
+    def with_zeros(self, zeros: Mapping[str, float]) -> "Mujoco":
+        """The same simulator with other zeros of the joints' encoders: their attribute `ref`."""
+        return Mujoco(self._source, self.joint, self._folder, self._shared, {**self.zeros, **zeros})
 
     def _sticks(self, seen: inverse.Along) -> Bool[np.ndarray, " N"]:
         """Where the model's dry friction is below its limit: it creeps to rest there, `(N,)`.

@@ -1,0 +1,250 @@
+"""The zero of an encoder, and two clocks: found by Gauss-Newton beside the simulator's own values.
+
+A wrong zero z makes the simulator's force f(q − z); a force whose stamps are late by τ is u(t) =
+f(t − τ), of a clock that runs at another rate τ grows with time. To first order each is a column
+like a wrong value. It is believed where the fewest columns that account for the mismatch include
+it, and these leave little.
+"""
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...data.recording import Recording
+from ...simulators import Mujoco
+from ..baseline import _fewest as fewest
+from ..naming import LINEARITY
+from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
+
+ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
+# A quarter of the power: what leaves more is not the fault, or not alone.
+LEAVES = 0.25
+# Steps below this part of the standard error change nothing.
+ROUNDS, CLOSE = 6, 0.1
+# A step of an angle, rad or m in parts of the motion, for the derivative by the zero.
+STEP = 1e-3
+# Forces are asked of the simulator at so many moments; between them the difference is smooth.
+MOMENTS = 2000
+# Shifts of up to this part of the record are tried.
+FARTHEST = 8
+
+
+class Faults(NamedTuple):
+    """The zeros by joint, rad or m, and how late the force is, s, and by how much more each second.
+
+    `errors`: of each value by name.
+    """
+
+    zeros: Mapping[str, float] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
+    late: float = 0.0
+    drift: float = 0.0
+    errors: Mapping[str, float] = {}  # noqa: RUF012
+
+    @property
+    def clock(self) -> bool:
+        """Whether the force has a clock of its own."""
+        return bool(self.late or self.drift)
+
+
+class Seen(NamedTuple):
+    """Where the search ended: the faults, what can be seen of those that are none, the rows."""
+
+    faults: Faults
+    values: Mapping[str, tuple[float, float]]
+    chosen: tuple[str, ...]
+    rows: list[Rows]
+
+
+def find(parts: Sequence[Part]) -> Seen:
+    """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
+    start = Faults(late=_shift([_rows(part) for part in parts]))
+    seen = _found(parts, start)
+    if start.late and not seen.faults.clock:
+        seen = _found(parts, Faults())
+    return seen
+
+
+def _found(parts: Sequence[Part], faults: Faults) -> Seen:
+    rows = [_rows(part, faults) for part in parts]
+    before = _energy(rows if not faults.late else [_rows(part) for part in parts])
+    known = {OFFSET} if faults.late else set[str]()
+    stack = _stack(parts, rows, faults)
+    chosen = _chosen(stack, rows)
+    for _ in range(ROUNDS):
+        new = {name for name in chosen if _is_fault(name)}
+        if not new - known and known or energy(stack, chosen) > LEAVES * before:
+            break
+        if not (known := known | new):
+            break
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen)
+        chosen = _chosen(stack, rows)
+    if known:
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen)
+    if _energy(rows) > before or not _matters(faults, parts):
+        faults, rows = Faults(), [_rows(part) for part in parts]
+        stack = _stack(parts, rows, faults)
+    beside = [name for name in chosen if not _is_fault(name)]
+    names = [n for n in stack.names if _is_fault(n) or n.endswith(": gain")]
+    beside = list(dict.fromkeys([*beside, OFFSET]))
+    each = {n: estimate(stack, [*(b for b in beside if b != n), n])[n] for n in names}
+    return Seen(faults, each, chosen, rows)
+
+
+def _refined(
+    parts: Sequence[Part], rows: list[Rows], faults: Faults, names: list[str], chosen
+) -> tuple[Faults, list[Rows], Stack]:
+    """Some faults fitted beside the other wrong values, by Gauss-Newton."""
+    beside = [name for name in chosen if name not in names and not _is_fault(name)]
+    # A part of a sample between force and motion is no fault, and no other value's either.
+    beside += [OFFSET] * (OFFSET not in names)
+    stack = _stack(parts, rows, faults)
+    for _ in range(ROUNDS):
+        values = estimate(stack, [*beside, *names])
+        steps = {name: values[name][0] for name in names}
+        faults = _moved(faults, steps)
+        faults = faults._replace(errors={name: values[name][1] for name in names})
+        rows = [_rows(part, faults) for part in parts]
+        stack = _stack(parts, rows, faults)
+        if all(abs(step) < CLOSE * values[name][1] for name, step in steps.items()):
+            break
+    return faults, rows, stack
+
+
+def _is_fault(name: str) -> bool:
+    return name.startswith((ZERO, OFFSET))
+
+
+def _energy(rows: Sequence[Rows]) -> float:
+    return sum(float(np.sum((each.weight * each.target) ** 2)) for each in rows)
+
+
+def _matters(faults: Faults, parts: Sequence[Part]) -> bool:
+    """Within a sample force and motion are aligned anyway; a force that is early acts late, as an
+    actuator's does, which is told from a lag elsewhere.
+    """
+    if faults.zeros or not faults.clock:
+        return True
+    time = np.asarray(parts[0].recording.time, float)
+    sample, half = float(np.median(np.diff(time))), float(np.ptp(time)) / 2
+    return faults.late > sample or abs(faults.drift) * half > sample
+
+
+def _moved(faults: Faults, steps: Mapping[str, float]) -> Faults:
+    zeros = dict(faults.zeros)
+    for name, step in steps.items():
+        if name.startswith(ZERO):
+            joint = name.removeprefix(ZERO)
+            zeros[joint] = zeros.get(joint, 0.0) + step
+    late = faults.late + steps.get(OFFSET, 0.0)
+    return faults._replace(zeros=zeros, late=late, drift=faults.drift + steps.get(DRIFT, 0.0))
+
+
+def _rows(part: Part, faults: Faults | None = None) -> Rows:
+    faults = faults or Faults()
+    log = put_right(part.recording, faults)
+    simulator = part.simulator
+    rows = rows_of(simulator.beside(log), simulator.baseline(log.units))
+    if not any(faults.zeros.values()) or not isinstance(simulator, Mujoco):
+        return rows
+    change = _differences(simulator, log, faults.zeros)
+    off = rows.evidence.project(change(rows))
+    return rows._replace(target=rows.target - off, known=rows.known + off)
+
+
+def put_right(recording: Recording, faults: Faults) -> Recording:
+    """The recording with its force on the motion's clock."""
+    if not faults.clock:
+        return recording
+    time, force = np.asarray(recording.time, float), np.asarray(recording.force, float)
+    late = faults.late + faults.drift * (time - (time[0] + time[-1]) / 2)
+    there = time + late
+    known = np.isfinite(force)
+    moved = np.interp(there, time[known], force[known])
+    inside = (there >= time[0]) & (there <= time[-1])
+    mask = np.asarray(recording.mask) & inside
+    kind = np.asarray(recording.force).dtype
+    return dataclasses.replace(recording, force=moved.astype(kind), mask=mask)
+
+
+def _stack(parts: Sequence[Part], rows: Sequence[Rows], faults: Faults) -> Stack:
+    """The simulator's own columns first: what they can say as well is theirs."""
+    columns = []
+    changes = _by_zero(parts, faults)
+    for part, own in zip(parts, rows, strict=True):
+        some = {_shared(name, part.name): own.own[:, i] for i, name in enumerate(own.names)}
+        for joint, change in changes.get(part.name, {}).items():
+            some[f"{ZERO}{joint}"] = own.evidence.project(change(own))
+        some[OFFSET], some[DRIFT] = -own.rate, -own.elapsed * own.rate
+        columns.append(some)
+    return stacked(rows, columns)
+
+
+def _shared(name: str, joint: str) -> str:
+    """A body's mass is one value for all joints; a gain and a constant force are each joint's."""
+    return name if "/" in name else f"{joint}: {name}"
+
+
+Change = Callable[[Rows], np.ndarray]
+
+
+def _by_zero(parts: Sequence[Part], faults: Faults) -> dict[str, dict[str, Change]]:
+    """By joint whose force it is, and by joint whose zero: the force's derivative at the nodes."""
+    found: dict[str, dict[str, Change]] = {}
+    for part in parts:
+        simulator = part.simulator
+        if not isinstance(simulator, Mujoco):
+            continue
+        found[part.name] = {
+            joint: _differences(simulator, part.recording, faults.zeros, joint)
+            for joint in simulator.joints
+        }
+    return found
+
+
+def _differences(
+    simulator: Mujoco, recording: Recording, zeros: Mapping[str, float], joint: str | None = None
+) -> Change:
+    """The change of the force by all zeros; its derivative by that of one joint."""
+    time = np.asarray(recording.time, float)
+    index = np.arange(0, len(time), max(1, len(time) // MOMENTS))
+    before = dict(zeros) if joint else {}
+    step = STEP if joint else 1.0
+    after = before | {joint: before.get(joint, 0.0) + step} if joint else dict(zeros)
+    first, second = (simulator.moved(recording, each, index) for each in (before, after))
+    change = (second - first) / step
+
+    def at(rows: Rows) -> np.ndarray:
+        return np.interp(nodes(rows), time[index], change)
+
+    return at
+
+
+def _chosen(stack: Stack, rows: Sequence[Rows]) -> tuple[str, ...]:
+    """The fewest columns that leave no more than all of them."""
+    force = sum(float(np.sum((r.weight * r.evidence.force) ** 2)) for r in rows)
+    found = fewest(stack.columns, stack.target, stack.block, LINEARITY**2 * force)
+    return tuple(stack.names[i] for i in found)
+
+
+def _shift(rows: Sequence[Rows]) -> float:
+    """How late the force is, s, where whole nodes halve what is left; else zero."""
+    step = min(each.evidence.reach for each in rows) / 6
+    first = nodes(rows[0])
+    even = np.arange(first[0], first[-1], step)
+    pairs = []
+    for each in rows:
+        at, motion = nodes(each), each.evidence.motion
+        known = np.asarray(motion.channels["known_force"], float)
+        force = np.asarray(motion.force, float)
+        pairs.append([each.weight * np.interp(even, at, x) for x in (force, known)])
+    most = len(even) // FARTHEST
+    inner = slice(most, len(even) - most)
+
+    def left(shift: int) -> float:
+        return sum(float(np.sum((np.roll(u, -shift)[inner] - f[inner]) ** 2)) for u, f in pairs)
+
+    tried = {shift: left(shift) for shift in range(-most, most + 1)}
+    best = min(tried, key=lambda shift: tried[shift])
+    return best * step if tried[best] < 0.5 * tried[0] and best > 0 else 0.0

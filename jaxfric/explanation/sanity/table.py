@@ -1,0 +1,190 @@
+"""The rows of the table of sanity, each in its own words."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...identification.uncertainty import Estimate
+from ...simulators import Mujoco
+from ..quantities import quantity
+from . import limits
+from .faults import DRIFT, OFFSET, ZERO, Seen
+from .rows import Part
+from .wiring import Wiring
+
+# Standard errors beyond which a value of no finding would have been looked at.
+HALF_WIDTH = 2.0
+
+
+class Check(NamedTuple):
+    """One thing that was looked at.
+
+    - `effect`: its public name; `text`: what there is to say; `wrong`, and whether nothing can be
+      named beside it, `severe`.
+    - `value` where it is one, as the `parameter`; `attribute`, the simulator's own name.
+    """
+
+    effect: str
+    text: str
+    wrong: bool = False
+    severe: bool = False
+    value: Estimate | None = None
+    parameter: str = ""
+    attribute: str | None = None
+    confusable: tuple[str, ...] = ()
+    separate_by: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row as plain data."""
+        value = self.value and {
+            "value": _plain(self.value.value),
+            "standard_error": _plain(self.value.standard_error),
+            "unit": self.value.unit,
+        }
+        return {
+            "check": self.effect, "wrong": self.wrong, "value": value or None, "text": self.text,
+            "attribute": self.attribute,
+        }  # fmt: skip
+
+
+def _plain(number) -> float | None:
+    return float(number) if np.isfinite(number) else None
+
+
+def checks_of(part: Part, seen: Seen, bound: Estimate | None, wired: Wiring) -> list[Check]:
+    """The table of one joint."""
+    return [
+        _wiring(part, wired.said, wired.everywhere),
+        *_gain(part, seen),
+        *_zeros(part, seen),
+        _clock(part, seen),
+        _limit(part, bound),
+        *_ends(part),
+    ]
+
+
+def _wiring(part: Part, said: Mapping[str, str], everywhere: bool) -> Check:
+    if part.name in said:
+        return Check("columns", said[part.name], True, True)
+    if said and everywhere:
+        return Check("columns", f"Nothing is compared: {next(iter(said.values()))}", True, True)
+    return Check("columns", "No other joint's columns fit better.")
+
+
+def _gain(part: Part, seen: Seen) -> list[Check]:
+    """Sign and size of the force as a whole, beside all else that is wrong."""
+    name = next((n for n in seen.values if n == f"{part.name}: gain"), None)
+    if name is None:
+        return []
+    value, error = seen.values[name]
+    times = Estimate(np.float64(1 + value), np.float64(error), "1")
+    chosen = name in seen.chosen
+    size = quantity(times._replace(value=np.float64(abs(1 + value))))
+    if 1 + value < 0 and chosen:
+        text = f"The force is counted the other way: it is {quantity(times)} times the simulator's."
+        return [Check("force_sign", text, True, value=times, parameter="gain")]
+    if chosen:
+        text = f"The torque constant is {size} times the simulator's."
+        return [
+            Check("force_sign", "The force has the simulator's sign."),
+            Check("force_gain", text, True, value=times, parameter="gain"),
+        ]
+    text = f"The torque constant is the simulator's ({size} times it, by itself)."
+    if not np.isfinite(error):
+        text = "The motion cannot tell the torque constant."
+    return [
+        Check("force_sign", "The force has the simulator's sign."),
+        Check("force_gain", text, value=times, parameter="gain"),
+    ]
+
+
+def _zeros(part: Part, seen: Seen) -> list[Check]:
+    """The zeros of the encoders: of all joints, for each may show in this one's force."""
+    if not isinstance(part.simulator, Mujoco):
+        return []
+    found = []
+    unit = part.recording.unit_names["position"]
+    for name, (value, error) in seen.values.items():
+        if not name.startswith(ZERO):
+            continue
+        joint = name.removeprefix(ZERO)
+        zero = seen.faults.zeros.get(joint, 0.0)
+        attribute = f"joint/{joint}/ref"
+        if zero:
+            error = seen.faults.errors.get(name, error)
+            own = Estimate(np.float64(zero), np.float64(error), unit)
+            text = f"The encoder's zero of joint {joint} is at {quantity(own)} of the simulator's."
+            found.append(Check("position_zero", text, True, False, own, f"{joint} zero", attribute))
+        elif joint == part.name:
+            own = Estimate(np.float64(value), np.float64(error), unit)
+            known = np.isfinite(error) and error < 1.0
+            text = f"The encoder's zero is the simulator's ({quantity(own)})."
+            if not known:
+                text = "The motion cannot tell the encoder's zero."
+            found.append(Check("position_zero", text, value=own, parameter=f"{joint} zero"))
+    return found
+
+
+_APART = "Log force and motion by one clock, or a step of both."
+
+
+def _clock(part: Part, seen: Seen) -> Check:
+    faults = seen.faults
+    if faults.clock:
+        error = faults.errors.get(OFFSET, 0.0)
+        late = Estimate(np.float64(faults.late), np.float64(max(error, 1e-12)), "s")
+        way = "late" if faults.late > 0 else "early"
+        size = quantity(late._replace(value=np.float64(abs(faults.late))))
+        text = f"The force has another clock than the motion: it is {size} {way}"
+        if faults.drift:
+            error = faults.errors.get(DRIFT, 0.0)
+            text += (
+                f" in the middle of the log, and {abs(faults.drift) * 1e6:.0f} ± "
+                f"{2e6 * error:.1g} µs more {'late' if faults.drift > 0 else 'early'} each second"
+            )
+            if abs(faults.late) < HALF_WIDTH * late.standard_error:
+                late = Estimate(np.float64(faults.drift), np.float64(error), "1")
+        near = () if faults.drift else ("sensor_filter",)
+        return Check("clock", f"{text}.", True, False, late, "delay", None, near, _APART)
+    if OFFSET not in seen.values:
+        return Check("clock", "Not looked at.")
+    value, error = map(np.float64, seen.values[OFFSET])
+    late = Estimate(value, error, "s")
+    drift = seen.values[DRIFT]
+    text = f"Force and motion are on one clock (force {quantity(late)} late"
+    text += f", drift {drift[0] * 1e6:.2g} ± {2e6 * drift[1]:.1g} µs a second)."
+    return Check("clock", text, value=late, parameter="delay")
+
+
+def _limit(part: Part, bound: Estimate | None) -> Check:
+    if bound is None:
+        return Check("force_limit", "No command was cut off by a limit of the force.")
+    count = limits.beyond(part.recording, bound)
+    share = count / max(int(np.count_nonzero(np.asarray(part.recording.mask))), 1)
+    text = (
+        f"The actuator gives no more than {quantity(bound)}: in {count} samples ({share:.1%}) the "
+        "command asks for more than arrives."
+    )
+    attribute = f"joint/{part.name}/actuatorfrcrange" if part.name else None
+    return Check("force_limit", text, True, False, bound, "force_limit", attribute)
+
+
+def _ends(part: Part) -> list[Check]:
+    """Rows at a limit of the joint, and where bodies of the model touch."""
+    simulator = part.simulator
+    if not isinstance(simulator, Mujoco):
+        return []
+    ends = int(np.count_nonzero(simulator.limited(part.recording)))
+    touch = float(np.mean(simulator.touches(part.recording)))
+    text = "The joint stays within the model's range, and its bodies apart."
+    said = []
+    if ends:
+        said.append(f"{ends} samples are at a limit of the joint in the model")
+    if touch:
+        said.append(f"in {touch:.0%} of the samples bodies of the model touch")
+    if said:
+        text = f"{' and '.join(said).capitalize()}: nothing is compared there."
+        if touch >= 0.5:
+            text = f"{' and '.join(said).capitalize()}, so that their contact is left out."
+    return [Check("joint_limit", text, bool(said))]

@@ -1,0 +1,139 @@
+"""Columns that belong to another joint, or count the other way: known by the force they leave."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...simulators import Mujoco
+from .faults import MOMENTS
+from .rows import Part, Rows, nodes
+
+# What leaves most of a force's power does not describe it; half of that is a description.
+WRONG, RIGHT = 0.5, 0.25
+
+
+class Wiring(NamedTuple):
+    """What is wrong with the columns, in words, by joint; empty where nothing is.
+
+    `everywhere`: whether no joint can be compared then.
+    """
+
+    said: dict[str, str]
+    everywhere: bool = True
+
+
+def look(parts: Sequence[Part], rows: Sequence[Rows]) -> Wiring:
+    """Whether forces are repeated or swapped, positions swapped or counted the other way."""
+    said = _repeated(parts)
+    bad = [i for i, own in enumerate(rows) if _left(own, own.known) > WRONG]
+    if said:
+        # The one that it belongs to is as good as it was.
+        others = {part.name for i, part in enumerate(parts) if i in bad}
+        return Wiring({n: text for n, text in said.items() if n in others} or said, False)
+    if not bad or not all(isinstance(part.simulator, Mujoco) for part in parts):
+        return Wiring({})
+    said = _swapped(parts, rows)
+    return Wiring(said or _positions(parts, rows))
+
+
+def _repeated(parts: Sequence[Part]) -> dict[str, str]:
+    said: dict[str, str] = {}
+    for what in ("force", "position"):
+        seen: dict[bytes, str] = {}
+        for part in parts:
+            values = np.asarray(getattr(part.recording, what) if what == "force" else
+                                part.recording.position)  # fmt: skip
+            key = values.tobytes()
+            if key in seen and np.ptp(values) > 0:
+                said[part.name] = (
+                    f"The {what} of joint {part.name} is that of joint {seen[key]}, sample by "
+                    f"sample: one column for two joints. Name its own: --columns "
+                    f"{part.name}_{what}=NAME."
+                )
+            seen.setdefault(key, part.name)
+    return said
+
+
+def _left(rows: Rows, known: np.ndarray) -> float:
+    """The part of a force's power that a known force leaves, whatever its sign and size."""
+    force = rows.evidence.force - rows.evidence.force.mean()
+    known = known - known.mean()
+    whole = float(force @ force) * float(known @ known)
+    return 1 - float(force @ known) ** 2 / whole if whole > 0 else 1.0
+
+
+def _swapped(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
+    """Joints whose recorded force is that of another joint of the simulator."""
+    names = [part.name for part in parts]
+    table = np.array([[_left(own, _other(own, rows[j])) for j in range(len(rows))] for own in rows])
+    best = table.argmin(axis=1)
+    off = [i for i in range(len(rows)) if best[i] != i]
+    sure = all(table[i, best[i]] < RIGHT and table[i, i] > WRONG for i in off)
+    if not off or not sure or len(set(best)) < len(best):
+        return {}
+    return {
+        names[i]: f"The force of joint {names[i]} is that of joint {names[best[i]]} in the "
+        f"simulator (its own leaves {np.sqrt(table[i, i]):.0%}, that one "
+        f"{np.sqrt(table[i, best[i]]):.0%}): the columns are permuted. Name them: --columns "
+        f"{names[best[i]]}_force=NAME."
+        for i in off
+    }
+
+
+def _other(own: Rows, other: Rows) -> np.ndarray:
+    """The simulator's force of another joint at the rows of this one."""
+    values = np.asarray(other.evidence.motion.channels["known_force"], float)
+    return own.evidence.project(np.interp(nodes(own), nodes(other), values))
+
+
+def _positions(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
+    """Positions that count the other way, or stand for each other's: one change that puts all
+    joints right.
+    """
+    simulator = parts[0].simulator
+    assert isinstance(simulator, Mujoco)
+    time = np.asarray(parts[0].recording.time, float)
+    index = np.arange(0, len(time), max(1, len(time) // MOMENTS))
+    number = {name: i for i, name in enumerate(simulator.joints)}
+    before = float(np.mean([_left(own, own.known) for own in rows]))
+    tried = {}
+    for names, sign in _changes(simulator.joints):
+        order = list(range(len(number)))
+        for one, two in zip(names, reversed(names), strict=True):
+            order[number[one]] = number[two]
+        signs = np.ones(len(number))
+        if sign < 0:
+            signs[number[names[0]]] = -1
+        force = simulator.turned(parts[0].recording, order, signs, index)
+        left = [
+            _left(own, own.evidence.project(np.interp(nodes(own), time[index], values)))
+            for part, own in zip(parts, rows, strict=True)
+            for values in (force[:, number[part.name]],)
+        ]
+        if max(left) < RIGHT:
+            tried[names, sign] = float(np.mean(left))
+    best = min(tried, key=lambda change: tried[change], default=None)
+    return _told(*best) if best is not None and tried[best] < 0.5 * before else {}
+
+
+def _changes(joints: Sequence[str]):
+    for name in joints:
+        yield (name,), -1.0
+    for i, one in enumerate(joints):
+        for two in joints[i + 1 :]:
+            yield (one, two), 1.0
+
+
+def _told(names: tuple[str, ...], sign: float) -> dict[str, str]:
+    if sign < 0:
+        text = (
+            f"The position of joint {names[0]} counts the other way than the simulator's. Turn it "
+            "round in the log, or the joint's axis in the model."
+        )
+        return {names[0]: text}
+    text = (
+        f"The positions of the joints {names[0]} and {names[1]} are swapped. Name them: --columns "
+        f"{names[0]}_position=NAME,{names[1]}_position=NAME."
+    )
+    return dict.fromkeys(names, text)
