@@ -23,6 +23,8 @@ ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
 LEAVES = 0.25
 # Steps below this part of the standard error change nothing.
 ROUNDS, CLOSE = 6, 0.1
+# Further, rad, an angle's sine is no straight line: 5 %.
+FAR = 0.5
 # A step of an angle, rad or m in parts of the motion, for the derivative by the zero.
 STEP = 1e-3
 # Forces are asked of the simulator at so many moments; between them the difference is smooth.
@@ -136,7 +138,7 @@ def _moved(faults: Faults, steps: Mapping[str, float]) -> Faults:
     for name, step in steps.items():
         if name.startswith(ZERO):
             joint = name.removeprefix(ZERO)
-            zeros[joint] = zeros.get(joint, 0.0) + step
+            zeros[joint] = zeros.get(joint, 0.0) + float(np.clip(step, -FAR, FAR))
     late = faults.late + steps.get(OFFSET, 0.0)
     return faults._replace(zeros=zeros, late=late, drift=faults.drift + steps.get(DRIFT, 0.0))
 

@@ -10,8 +10,8 @@ from ...simulation.prediction import in_motion
 from ...terms import KNOWN_FORCE
 from ..chance import FEWEST
 
-# Of the mismatch in the samples that ask for more: what a clip leaves of it, and of all of it. A
-# soft knee, which gives a part of the excess, leaves more.
+# Of the mismatch in the samples that ask for more: what a clip leaves of it, and of all of it; and
+# the part of the excess that arrives. A soft knee leaves more, and gives more.
 LEAVES, LEAVES_IN_ALL = 0.25, 0.5
 # A machine that is at its limit most of the time does not do what it is told.
 MOST = 0.5
@@ -37,6 +37,10 @@ def hard_limit(recording: Recording) -> Estimate | None:
     beyond = size > level
     inside = np.sum((level - needed[beyond]) ** 2)
     if not inside < LEAVES * np.sum(mismatch[beyond]):
+        return None
+    excess = size[beyond] - np.mean(size[beyond])
+    part = float(excess @ needed[beyond]) / max(float(excess @ excess), 1e-300)
+    if abs(part) > LEAVES:
         return None
     visits = np.flatnonzero(np.diff(beyond.astype(int), prepend=0) == 1)
     spread = float(np.std(needed[beyond]))

@@ -1,0 +1,194 @@
+"""Sanity before physics: what is wrong with a log and no physics is told as itself, first."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from jaxfric import Recording, cli, explain
+from jaxfric.explanation import sanity
+from jaxfric.explanation.sanity import Part, look
+from jaxfric.simulators import Known, Mujoco
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco><worldbody><body name="upper"><joint name="shoulder" axis="0 1 0" damping="0.8"
+ frictionloss="0.3" armature="0.05"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"
+ mass="2" contype="0"/><body name="forearm" pos="0.3 0 0"><joint name="elbow" axis="0 1 0"
+ damping="0.5" frictionloss="0.15" armature="0.02"/><geom type="capsule" fromto="0 0 0 0.25 0 0"
+ size="0.03" mass="1.2" contype="0"/></body></body></worldbody></mujoco>"""
+JOINTS = ("shoulder", "elbow")
+UNITS = {"force": "N·m", "position": "rad"}
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """Time, positions and forces of both joints, `(N, 2)`, by MuJoCo's inverse dynamics."""
+    draw, model = np.random.default_rng(1), mujoco.MjModel.from_xml_string(ARM)
+    time = np.arange(0, 12, 0.002)
+    rates = 2 * np.pi * np.array([0.3, 0.7, 1.3])
+    phases, sizes = draw.uniform(0, 6, (2, 3)), np.array([0.5, 0.2, 0.1])
+    angle = rates * time[:, None, None] + phases
+    position, speed = np.sin(angle) @ sizes, np.cos(angle) @ (rates * sizes)
+    force, data = np.empty_like(position), mujoco.MjData(model)
+    for i, acceleration in enumerate(-np.sin(angle) @ (rates**2 * sizes)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = position[i], speed[i], acceleration
+        mujoco.mj_inverse(model, data)
+        force[i] = data.qfrc_inverse
+    count = 2 * np.pi / 2**17
+    noisy = force + 0.005 * force.std(axis=0) * draw.normal(size=force.shape)
+    return time, count * np.round(position / count), noisy
+
+
+def parts(time, position, force, model=ARM):
+    """Both joints' recordings beside their simulators."""
+    shared: dict = {}
+    return [
+        Part(
+            Recording(
+                time, force[:, j], position[:, j], units=UNITS,
+                channels={JOINTS[1 - j]: position[:, 1 - j]},
+            ),
+            None, Mujoco(model, JOINTS[j], shared=shared), JOINTS[j],
+        )
+        for j in (0, 1)
+    ]  # fmt: skip
+
+
+def wrong(looked):
+    return {check.effect: check for check in looked.checks if check.wrong}
+
+
+def test_nothing_is_nothing(motion):
+    for joint in look(parts(*motion)):
+        assert not wrong(joint) and not joint.changed and joint.wrong is None
+        effects = [check.effect for check in joint.checks]
+        assert effects == [
+            "columns", "force_sign", "force_gain", "position_zero", "clock", "force_limit",
+            "joint_limit",
+        ]  # fmt: skip
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_a_wrong_zero_is_a_zero_and_no_mass(motion, joint):
+    time, position, force = motion
+    moved = position + 0.1 * np.eye(2)[joint]
+    looked = look(parts(time, moved, force))
+    for each in looked:
+        assert set(wrong(each)) == {"position_zero"}
+        zero = wrong(each)["position_zero"]
+        assert zero.attribute == f"joint/{JOINTS[joint]}/ref"
+        assert abs(zero.value.value - 0.1) < 3 * zero.value.standard_error + 2e-4
+        assert each.power[1] < 0.01 * each.power[0]
+    right = looked[1].part.simulator
+    assert right.model.qpos0[joint] == pytest.approx(0.1, abs=2e-3)
+
+
+@pytest.mark.parametrize("rate", [0.0, 2e-3])
+def test_two_clocks(motion, rate):
+    time, position, force = motion
+    middle = (time[0] + time[-1]) / 2
+    late = 0.03 + rate * (time - middle)
+    shifted = np.stack([np.interp(time - late, time, f) for f in force.T], axis=1)
+    for each in look(parts(time, position, shifted)):
+        assert set(wrong(each)) == {"clock"} and "another clock" in wrong(each)["clock"].text
+        assert each.faults.late == pytest.approx(0.03, abs=1e-3)
+        assert each.faults.drift == pytest.approx(rate, abs=1e-4)
+
+
+def test_a_force_that_acts_late_is_no_clock(motion):
+    """A command that comes before its motion is a dead time, which is told from a lag elsewhere."""
+    time, position, force = motion
+    early = np.stack([np.interp(time + 0.01, time, f) for f in force.T], axis=1)
+    assert not any(joint.changed for joint in look(parts(time, position, early)))
+
+
+def test_a_command_beyond_what_arrives_is_a_limit(motion):
+    time, position, force = motion
+    top = 0.8 * np.abs(force[:, 1]).max()
+    arrived, units = np.clip(force[:, 1], -top, top), UNITS
+    recording = Recording(time, force[:, 1], position[:, 1], units=units)
+    (looked,) = look([Part(recording, None, Known(arrived))])
+    limit = wrong(looked)["force_limit"]
+    assert limit.value.value == pytest.approx(top, rel=1e-3)
+    assert f"in {np.count_nonzero(np.abs(force[:, 1]) > limit.value.value)} samples" in limit.text
+    assert looked.power[1] < 0.01 * looked.power[0]
+
+
+def test_a_soft_knee_is_no_hard_limit(motion):
+    time, position, force = motion
+    size = np.abs(force[:, 1])
+    asked = force[:, 1] + np.sign(force[:, 1]) * 0.5 * np.maximum(size - 0.6 * size.max(), 0)
+    recording = Recording(time, asked, position[:, 1], units=UNITS)
+    assert "force_limit" not in wrong(look([Part(recording, None, Known(force[:, 1]))])[0])
+
+
+def test_columns_of_another_joint(motion):
+    time, position, force = motion
+    for each, other in zip(look(parts(time, position, force[:, ::-1])), JOINTS[::-1], strict=True):
+        assert f"is that of joint {other}" in each.wrong and f"{other}_force=NAME" in each.wrong
+    for each in look(parts(time, position[:, ::-1], force)):
+        assert "positions of the joints shoulder and elbow are swapped" in each.wrong
+    for each in look(parts(time, position * [1, -1], force)):
+        assert "position of joint elbow counts the other way" in each.wrong
+    shoulder, elbow = look(parts(time, position, force[:, [0, 0]]))
+    assert shoulder.wrong is None and "one column for two joints" in elbow.wrong
+
+
+def test_sign_and_torque_constant(motion):
+    time, position, force = motion
+    shoulder, elbow = look(parts(time, position, force * [-1.0, 1.15]))
+    assert wrong(shoulder)["force_sign"].value.value == pytest.approx(-1.0, abs=2e-3)
+    assert "torque constant is 1.15" in wrong(elbow)["force_gain"].text
+
+
+def test_where_the_joint_is_at_its_limit_nothing_is_compared(motion):
+    model = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-30 90"')
+    elbow = look(parts(*motion, model))[1]
+    ends = np.asarray(elbow.part.simulator.limited(elbow.part.recording))
+    assert 0 < ends.mean() < 0.5 and "at a limit of the joint" in wrong(elbow)["joint_limit"].text
+    seen = elbow.beside(elbow.part.recording)
+    assert not np.asarray(seen.mask)[ends].any()
+
+
+def test_a_force_from_elsewhere_has_a_clock_and_a_limit_too(motion):
+    time, position, force = motion
+    late = np.interp(time - 0.02, time, force[:, 1])
+    recording = Recording(time, late, position[:, 1], units=UNITS)
+    (looked,) = look([Part(recording, None, Known(force[:, 1]))])
+    assert set(wrong(looked)) == {"clock"}
+    assert looked.faults.late == pytest.approx(0.02, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_an_explanation_tells_what_was_looked_at(motion):
+    time, position, force = motion
+    moved = position + [0.0, 0.1]
+    recording = parts(time, moved, force)[1].recording
+    found = explain(recording, Mujoco(ARM, "elbow"))
+    (finding,) = found.findings
+    assert finding.effect == "position_zero" and found.verdict == "explained"
+    assert (
+        found.fit["filtered_force_error"]["after"]
+        < 0.2 * found.fit["filtered_force_error"]["before"]
+    )
+    document = json.loads(json.dumps(found.to_dict()))
+    assert [row["check"] for row in document["sanity"] if row["wrong"]] == ["position_zero"]
+    turned = dataclasses.replace(recording, position=-recording.position)
+    assert (
+        sanity.looked_at(turned, Mujoco(ARM, "elbow"), None).wrong is None
+    )  # one joint: no telling
+
+
+@pytest.mark.slow
+def test_the_command_names_the_columns_to_swap(motion, tmp_path, capsys):
+    time, position, force = motion
+    table = np.column_stack([time, position, force[:, ::-1]])
+    header = "t,shoulder_position,elbow_position,shoulder_effort,elbow_effort"
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+    (tmp_path / "arm.xml").write_text(ARM)
+    options = ["--mujoco", str(tmp_path / "arm.xml"), "--report", str(tmp_path / "out.html")]
+    assert cli.main(["explain", str(tmp_path / "log.csv"), *options]) == 0
+    assert "the columns are permuted" in " ".join(capsys.readouterr().out.split())
+    assert "Looked at before any physics" in (tmp_path / "out_elbow.html").read_text()
