@@ -1,6 +1,7 @@
 """A simulator's file put right: only what was meant is changed, and MuJoCo reads it back."""
 
 import difflib
+import json
 import math
 
 import numpy as np
@@ -180,6 +181,36 @@ def test_arrays_of_all_joints_have_their_names(tmp_path):
     np.savez(path, t=time, q=q, tau=tau)
     found = columns_of(load(path).columns, ["shoulder", "elbow"], {}, "log")
     assert found["elbow"] == {"position": "q:2", "force": "tau:2"}
+
+
+def test_vectors_in_a_row_are_joints(tmp_path):
+    """As LeRobot writes them, with the joints' names in the data set's description and without."""
+    pa = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    time, q, tau = joint_arrays()
+    columns = {
+        "observation.state": pa.array(q.astype(np.float32).tolist(), pa.list_(pa.float32(), 2)),
+        "observation.effort": tau.tolist(), "action": (q + 0.1).tolist(),
+        "timestamp": time.astype(np.float32), "episode_index": np.zeros(len(time), int),
+        "observation.images": [["a"]] * len(time),
+    }  # fmt: skip
+    path = tmp_path / "data" / "chunk-000" / "episode_000000.parquet"
+    path.parent.mkdir(parents=True)
+    parquet.write_table(pa.table(columns), path)
+    found = columns_of(load(path).columns, ["shoulder", "elbow"], {}, "log")
+    assert found["elbow"] == {"position": "position:2", "force": "effort:2"}
+    (tmp_path / "meta").mkdir()
+    parts = ["shoulder.pos", "elbow.pos"]
+    features = {
+        "observation.state": {"names": parts}, "action": {"names": {"motors": parts}},
+        "observation.effort": {"names": ["shoulder", "elbow"]},
+    }  # fmt: skip
+    (tmp_path / "meta" / "info.json").write_text(json.dumps({"features": features}))
+    table = load(path)
+    assert {"elbow/position", "elbow/reference", "elbow/effort", "segment"} <= set(table.columns)
+    np.testing.assert_allclose(table.columns["elbow/position"], q[:, 1], atol=1e-7)
+    found = columns_of(table.columns, ["shoulder", "elbow"], {}, "log")
+    assert found["elbow"] == {"position": "elbow/position", "force": "elbow/effort"}
 
 
 @pytest.mark.parametrize("kind", ["SQLITE3", "MCAP"])

@@ -190,8 +190,11 @@ def _log(
     else:
         others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
         roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
-        if "time" in arguments.columns:
-            roles["time"] = arguments.columns["time"]
+        for role in ("time", "segment"):
+            if role in arguments.columns:
+                roles[role] = arguments.columns[role]
+        if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:
+            roles["segment"] = "segment"
         turned = arguments.scale.get("position")
         scale = arguments.scale | ({} if turned is None else dict.fromkeys(others, turned))
         log, notes = read_with_notes(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from . import bags
+from . import bags, vectors
 from .delimited import Table, arrow_column, read_csv, unique
 
 
@@ -78,6 +78,11 @@ def _read_parquet(path: Path) -> Table:
         flat = [i for i, field in enumerate(table.schema) if not pa.types.is_nested(field.type)]
         names = unique([table.schema.field(i).name for i in flat])
         columns = {n: arrow_column(table.column(i)) for n, i in zip(names, flat, strict=True)}
+        nested = [i for i in range(table.num_columns) if i not in flat]
+        for i in nested:
+            columns |= vectors.spread(table.column(i), table.schema.field(i).name, path)
+        if nested and vectors.EPISODE in columns:
+            columns["segment"] = columns.pop(vectors.EPISODE)
     return Table(columns, 1, [])
 
 
