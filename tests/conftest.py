@@ -71,18 +71,16 @@ def pytest_runtest_teardown(held=[0]):  # noqa: B006
 
 
 @pytest.fixture(scope="session", autouse=True)
-def kept_programs(tmp_path_factory, request):
-    """Identifications compiled as the command line does it, quickly and once for all workers.
+def cached_programs(tmp_path_factory, request):
+    """What one worker has compiled, the others take from jax's own cache.
 
     Not in a run of the slow tests: what Python users get is compiled there.
     """
     if request.config.getoption("-m") == "slow":
-        yield
         return
     base = tmp_path_factory.getbasetemp()
     shared = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
-    with programs.kept_in(shared / "programs"):
-        yield
+    programs.use_cache(shared / "programs")
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jaxfric
-from jaxfric import cli, models
+from jaxfric import models
 from jaxfric.cli import commands, main
 from jaxfric.data import io
 from jaxfric.data.recording import LONG, PADDING, uniform
@@ -349,15 +349,6 @@ def test_a_reader_that_leaves_is_no_error():
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 0
-
-
-def test_where_compiled_programs_are_kept(monkeypatch, tmp_path):
-    assert cli._cache_folder() is None  # the fixture above says off
-    monkeypatch.setenv("JAXFRIC_CACHE", str(tmp_path / "mine"))
-    assert cli._cache_folder() == tmp_path / "mine"
-    monkeypatch.delenv("JAXFRIC_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert cli._cache_folder() == tmp_path / "jaxfric"
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 import jaxfric as jf
 from jaxfric.data.recording import uniform
 
-UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"))
+UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"), ("mm", "kN"))
 LENGTHS = (2500, 2600, 2900, 3000, 3333, 3500, 3700, 3999, 4000, 4096)
 
 
@@ -45,6 +45,7 @@ def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
     for number, fit in enumerate(found):
         coulomb = fit.parameters["coulomb+"]
         assert abs(coulomb.value - (5 + number)) < 3 * coulomb.standard_error
+        assert coulomb.unit == UNITS[number % len(UNITS)][1]
 
 
 def test_a_session_over_recordings_of_any_length_stays_bounded():

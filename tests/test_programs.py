@@ -1,4 +1,8 @@
-"""Programs kept on disk: the same results, no tracing, and no harm from a bad file."""
+"""How functions are compiled: the same results, a user's law as it stands, and jax's own cache."""
+
+import subprocess
+import sys
+from pathlib import Path
 
 import equinox as eqx
 import jax
@@ -19,166 +23,111 @@ class Traces:
     count = 0
 
 
-@programs.kept
-def double(pair, power, table):
+def double(pair, power):
     Traces.count += 1
-    return Pair(2 * pair.value**power, pair.name), table["shift"] + 1
+    return Pair(2 * pair.value**power, pair.name)
 
 
 @pytest.fixture(autouse=True)
 def fresh():
     Traces.count = 0
-    jax.clear_caches()
 
 
-ARGUMENTS = (Pair(np.arange(3.0), "a"), 2, {"shift": np.ones(2)})
+PAIR = Pair(np.arange(3.0), "a")
 
 
-def call(folder, arguments=ARGUMENTS):
-    with programs.kept_in(folder):
-        return double(*arguments)
+def test_it_is_compiled_once_for_what_decides_the_program():
+    call = programs.compiled(double)
+    np.testing.assert_array_equal(call(PAIR, 2).value, [0.0, 2.0, 8.0])
+    call(Pair(np.ones(3), "a"), 2)  # values do not decide
+    assert Traces.count == 1
+    others = [(Pair(PAIR.value, "b"), 2), (PAIR, 3), (Pair(np.arange(4.0), "a"), 2)]
+    assert [call(*arguments).name for arguments in others] == ["b", "a", "a"]
+    assert Traces.count == 4
 
 
-def files(folder):
-    return sorted(folder.glob("*.program"))
+def test_inside_a_trace_it_is_an_ordinary_function():
+    """Options of the compiler are for whole programs only."""
+    call = programs.compiled(optimised=programs.LITTLE)(double)
 
-
-def test_a_kept_program_is_not_traced_again(tmp_path):
-    first, second = call(tmp_path), call(tmp_path)
-    assert Traces.count == 1 and len(files(tmp_path)) == 1
-    assert not [f for f in tmp_path.iterdir() if f.suffix != ".program"]
-    plain = double(*ARGUMENTS)
-    assert jax.tree.structure(first) == jax.tree.structure(second) == jax.tree.structure(plain)
-    for a, b, c in zip(*map(jax.tree.leaves, (first, second, plain)), strict=True):
-        np.testing.assert_array_equal(a, b)
-        np.testing.assert_array_equal(a, c)
-
-
-def test_whatever_decides_a_program_is_in_its_name(tmp_path):
-    pair, power, table = ARGUMENTS
-    others = [
-        (Pair(pair.value, "b"), power, table),
-        (pair, 3, table),
-        (Pair(np.arange(4.0), "a"), power, table),
-        (Pair(np.arange(3, dtype=np.float32), "a"), power, table),
-    ]
-    call(tmp_path)
-    for arguments in others:
-        call(tmp_path, arguments)
-    assert len(files(tmp_path)) == Traces.count == 5
-    call(tmp_path, (Pair(np.zeros(3), "a"), power, table))  # values do not
-    assert Traces.count == 5
-
-
-def first(scale, pair):
-    Traces.count += 1
-    return Pair(scale * pair.value, pair.name), None
-
-
-def second(before, scale, pair):
-    Traces.count += 1
-    (scaled, nothing) = before
-    assert nothing is None and scaled.name == pair.name
-    return scaled.value - pair.value, pair
-
-
-def test_steps_are_kept_one_by_one(tmp_path):
-    steps = programs.kept(first, second)
-    plain = steps(3, ARGUMENTS[0])
-    Traces.count = 0
-    for again, traced in ((None, 2), (None, 0), ("first", 1), ("second", 1)):
-        for path in files(tmp_path):
-            if again is not None and again in path.name:
-                path.unlink()
-        with programs.kept_in(tmp_path):
-            found = steps(3, ARGUMENTS[0])
-        assert Traces.count == traced and len(files(tmp_path)) == 2
-        assert jax.tree.structure(found) == jax.tree.structure(plain)
-        np.testing.assert_array_equal(found[0], [0.0, 2.0, 4.0])
-        np.testing.assert_array_equal(found[1].value, plain[1].value)
-        Traces.count = 0
-
-
-def test_a_step_that_fails_says_so(tmp_path):
-    def fails(before, scale, pair):
-        raise ValueError("no such model")
-
-    with programs.kept_in(tmp_path), pytest.raises(ValueError, match="no such model"):
-        programs.kept(first, fails)(3, ARGUMENTS[0])
-    assert not files(tmp_path) and not any(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("damage", [b"", b"not a program", None])
-def test_a_damaged_program_is_made_anew(tmp_path, damage):
-    call(tmp_path)
-    (path,) = files(tmp_path)
-    path.write_bytes(path.read_bytes()[:-100] if damage is None else damage)
-    np.testing.assert_array_equal(call(tmp_path)[0].value, [0.0, 2.0, 8.0])
-    assert Traces.count == 2
-    call(tmp_path)
-    assert Traces.count == 2
-
-
-def test_a_folder_that_cannot_be_written_does_no_harm(tmp_path):
-    blocked = tmp_path / "file"
-    blocked.write_text("no folder")
-    np.testing.assert_array_equal(call(blocked)[0].value, [0.0, 2.0, 8.0])
-
-
-def test_inside_a_trace_it_is_an_ordinary_function(tmp_path):
     def total(value):
-        with programs.kept_in(tmp_path):
-            return jnp.sum(double(Pair(value, "a"), 2, {"shift": jnp.ones(2)})[0].value)
+        return jnp.sum(call(Pair(value, "a"), 2).value)
 
     np.testing.assert_allclose(jax.jit(jax.grad(total))(jnp.arange(3.0)), [0.0, 4.0, 8.0])
-    assert not files(tmp_path)
 
 
-def test_the_oldest_programs_go(tmp_path, monkeypatch):
-    call(tmp_path)
-    size = files(tmp_path)[0].stat().st_size
-    monkeypatch.setattr(programs, "MOST", int(2.5 * size))
-    for power in range(4):
-        call(tmp_path, (ARGUMENTS[0], power, ARGUMENTS[2]))
-        Traces.count = 0
-    assert len(files(tmp_path)) == 2
-    call(tmp_path, (ARGUMENTS[0], 3, ARGUMENTS[2]))
-    assert Traces.count == 0
+LAW = """
+from jaxfric.terms import AbstractLaw, Parameter
+from jaxfric.units import FORCE
+
+class Drag(AbstractLaw):
+    '''Drag that grows with a power of the speed.'''
+
+    affine = (Parameter("drag", FORCE),)
+
+    def law(self, sample):
+        return (POWER,)
+"""
 
 
-def test_what_is_optimised_a_little_is_so_without_a_folder_too(tmp_path):
-    plain = programs.kept(first, second)
-    little = programs.kept(first, second, optimised=programs.LITTLE)
-    expected = plain(3, ARGUMENTS[0])[0]
-    np.testing.assert_array_equal(little(3, ARGUMENTS[0])[0], expected)
-    # Options of the compiler are for whole programs only; inside another it has none.
-    inside = eqx.filter_jit(lambda pair: little(3, pair)[0])
-    np.testing.assert_array_equal(inside(Pair(jnp.arange(3.0), "a")), expected)
-    with programs.kept_in(tmp_path):
-        np.testing.assert_array_equal(little(3, ARGUMENTS[0])[0], expected)
+def test_a_law_that_was_edited_is_identified_as_it_stands():
+    """Under the same name in the same place, whatever is cached in this process or in a folder."""
+    time = np.arange(600) / 500
+    velocity = np.sin(9 * time)
+    log = jf.Recording(time, 2 * velocity, None, velocity)
+
+    def found(power):
+        module = {"__name__": "laws"}
+        exec(LAW.replace("POWER", power), module)
+        term = module["Drag"]()
+        drag = jf.identify(term, log, projection=jf.WeakForm(8)).parameters["drag"]
+        return float(drag.value)
+
+    np.testing.assert_allclose([found("sample.velocity"), found("4 * sample.velocity")], [2, 0.5])
 
 
-def test_files_of_other_names_units_and_lengths_share_their_programs():
-    """What is compiled for the first of ten serves the nine others, of the same padded length."""
-    compiled = []
+ROOT = Path(__file__).parents[1]
 
-    def listen(event, duration, **facts):
-        if "backend_compile" in event:
-            compiled.append(event)
 
-    logs = []
-    for i in range(10):
-        time = np.arange(1100 + 17 * i) / 500
-        speed = 0.1 * np.sin(2 * np.pi * time) + 0.05 * np.sin(7 * time + i)
-        noise = 0.1 * np.random.default_rng(i).normal(size=time.size)
-        units = {"force": ("N", "kN", "A")[i % 3], "position": ("m", "mm")[i % 2]}
-        force = 5 * np.sign(speed) + 3 * speed + np.gradient(speed, time) + noise
-        logs.append(jf.Recording(time, force, None, speed, units=units, source=f"log{i}.csv"))
-    jax.monitoring.register_event_duration_secs_listener(listen)
-    counts, found = [], []
-    for log in logs:
-        before = len(compiled)
-        found.append(jf.identify("coulomb-viscous", log))
-        counts.append(len(compiled) - before)
-    assert counts[1:] == [0] * 9, counts
-    assert found[1].parameters["coulomb+"].unit == "kN" and found[2].model.units[0][1] == "A"
+def process(folder, between=""):
+    """What a process says that compiles as the command does; `between`: what happens before."""
+    code = (
+        "import jax, os, sys\n"
+        "hits = []\n"
+        "jax.monitoring.register_event_listener(lambda e, **_: hits.append(e))\n"
+        "from jaxfric.cli import _configure\n"
+        f"os.environ['JAXFRIC_CACHE'] = folder = {str(folder)!r}\n"
+        f"_configure()\n{between}\n"
+        "jax.jit(lambda x: x + 1)(1.0)\n"
+        "print(hits.count('/jax/compilation_cache/cache_hits'))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    return int(done.stdout)
+
+
+def test_the_next_process_takes_programs_from_the_folder(tmp_path):
+    assert process(tmp_path / "cache") == 0
+    assert process(tmp_path / "cache") > 0
+
+
+def test_a_folder_that_cannot_be_used_does_no_harm(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    before = jax.config.jax_compilation_cache_dir
+    assert programs.use_cache(blocked) is None
+    assert before == jax.config.jax_compilation_cache_dir
+    gone = "os.rmdir(folder); open(folder, 'w').close()"
+    assert process(tmp_path / "gone", gone) == 0
+
+
+def test_where_the_folder_is(monkeypatch, tmp_path):
+    monkeypatch.setenv("JAXFRIC_CACHE", "off")
+    assert programs.cache_folder() is None and programs.use_cache() is None
+    monkeypatch.setenv("JAXFRIC_CACHE", str(tmp_path / "mine"))
+    assert programs.cache_folder() == tmp_path / "mine"
+    monkeypatch.delenv("JAXFRIC_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    assert programs.cache_folder() == tmp_path / "jaxfric"

@@ -13,7 +13,6 @@ import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import TextIOWrapper
-from pathlib import Path
 
 from . import options
 from .completion import SHELLS, Completion
@@ -31,6 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         options.check_outputs(arguments)
+        gc.disable()  # importing makes much and throws nothing away: a tenth of its time
         _configure()
         status = arguments.run(arguments)
         sys.stdout.flush()
@@ -50,38 +50,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _configure() -> None:
-    """float64, and compiled programs kept in the user's cache folder."""
-    gc.disable()  # importing makes much and throws nothing away: a fifth of its time
+    """float64, and jax's cache of compiled programs in the user's cache folder."""
     # Explaining multiplies many small matrices, where several threads wait more than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import jax
 
+    from ..programs import use_cache
+
     jax.config.update("jax_enable_x64", True)
-    folder = _cache_folder()
-    if folder is None:
-        return
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return  # slower from the second run on, and no worse
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
-    # An entry of a process that was killed is made anew; the user need not hear of it.
+    use_cache()
+    # A folder that cannot be written, an entry of a process that was killed: the program is
+    # compiled anew, and the user need not hear of it.
     warnings.filterwarnings("ignore", "Error (reading|writing) persistent compilation cache")
-
-
-def _cache_folder() -> Path | None:
-    """Where JAXFRIC_CACHE says, else the platform's folder for caches; `None` for "off"."""
-    chosen = os.environ.get("JAXFRIC_CACHE", "")
-    if chosen:
-        return None if chosen == "off" else Path(chosen)
-    base = os.environ.get("XDG_CACHE_HOME")
-    if not base and sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA")
-    if not base and sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    return Path(base or Path.home() / ".cache") / "jaxfric"
 
 
 class _Parser(argparse.ArgumentParser):

@@ -26,7 +26,6 @@ from ..identification.projections import AbstractProjection, ClosedWindows, Weak
 from ..identification.selection import Selection
 from ..looks.text import text
 from ..models import Model
-from ..programs import kept_in
 from ..signals import kernel_half_width, prepare
 from ..simulation.prediction import delay_of, force_error, in_motion, relative, residual
 from ..units import SI
@@ -58,17 +57,16 @@ def fitted(
     bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
-    with kept_in(programs_folder()):
-        log = uniform(recording)
-        chosen: AbstractProjection | None = None
-        if projection == "closed-windows":
-            chosen = ClosedWindows()
-        elif projection == "weak-form":
-            chosen = WeakForm(kernel_half_width(prepare(log)))
-        try:
-            found = identify_recording(model, log, projection=chosen, bounds=bounds)
-        except ValueError as error:
-            raise ValueError(f"{recording.source}: {error}") from error
+    log = uniform(recording)
+    chosen: AbstractProjection | None = None
+    if projection == "closed-windows":
+        chosen = ClosedWindows()
+    elif projection == "weak-form":
+        chosen = WeakForm(kernel_half_width(prepare(log)))
+    try:
+        found = identify_recording(model, log, projection=chosen, bounds=bounds)
+    except ValueError as error:
+        raise ValueError(f"{recording.source}: {error}") from error
     # Arrays of numpy: taking them apart compiles nothing.
     return model, jax.tree.map(np.asarray, found)
 
@@ -78,7 +76,7 @@ def select(recording: Recording, path: str) -> Selection:
     from ..identification.selection import select as select_model
 
     show_progress("")
-    with kept_in(programs_folder()), working(f"selecting for {path}") as doing:
+    with working(f"selecting for {path}") as doing:
         doing(f"{len(known.names())} models, each judged on samples that it was not fitted to")
         try:
             return select_model(recording)
@@ -106,12 +104,6 @@ def selection(arguments: Namespace) -> int:
     if arguments.json and done:
         put(arguments.json, documents.to_json(done if len(arguments.files) > 1 else done[0]))
     return 2 if failures else 0
-
-
-def programs_folder() -> Path | None:
-    """Beside jax's own cache, if there is one."""
-    folder = jax.config.values["jax_compilation_cache_dir"]
-    return None if folder is None else Path(folder) / "programs"
 
 
 def identify(arguments: Namespace) -> int:

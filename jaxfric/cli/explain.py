@@ -10,12 +10,11 @@ from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
 from ..identification import documents, tabulate
 from ..models import Model, load, named
-from ..programs import kept_in
 from ..report import page
 from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
 from . import robot
-from .commands import programs_folder, put, read, today, working
+from .commands import put, read, today, working
 from .options import say, standard
 
 
@@ -34,7 +33,7 @@ def run(arguments: Namespace) -> int:
         notes = notes + [f"Held out: {note}" for note in more if note != notes[0]]
     baseline = _baseline(arguments, recording, holdout)
     try:
-        with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
+        with working(f"explaining {arguments.file}") as doing:
             found = explain(
                 recording,
                 baseline,

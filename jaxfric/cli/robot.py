@@ -15,12 +15,11 @@ from ..explanation import Explanation, explain
 from ..explanation.sanity import Check, Looked, Part, look
 from ..export.patch import Patch, patch
 from ..identification import documents, tabulate
-from ..programs import kept_in
 from ..report import page, robot
 from ..simulators import Mujoco
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..simulators.patching import folder_of, patched
-from .commands import programs_folder, put, read, today, working
+from .commands import put, read, today, working
 from .options import message, say, standard
 
 SCHEMA = "jaxfric.robot/1"
@@ -87,7 +86,7 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     corrected: tuple[str, ...] = ()
     shared: dict[bytes, Any] = {}
     hinges = {name: is_hinge(mujoco, model, joints.index(name)) for name in joints}
-    with kept_in(programs_folder()), working(f"explaining {arguments.file}") as doing:
+    with working(f"explaining {arguments.file}") as doing:
         doing("signs, zeros, clocks and limits of all joints")
         opened = {
             name: _opened(name, shared, logs, columns, arguments, hinges[name]) for name in chosen

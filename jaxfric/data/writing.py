@@ -2,7 +2,7 @@
 
 import csv
 import os
-import tempfile
+import secrets
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from io import StringIO
@@ -89,16 +89,16 @@ def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         except OSError as error:
             raise ValueError(f"{path}: cannot be written: {error.strerror}.") from error
         return
+    name = target.parent / (f".{target.name}"[:100] + f".{secrets.token_hex(4)}")
     try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}"[:100] + ".")
+        handle = name.open("xb")
     except OSError as error:
         raise ValueError(
             f"{path}: cannot be written: {error.strerror}. Is the folder there?"
         ) from error
     try:
-        with os.fdopen(handle, "wb") as file:
+        with handle as file:
             write(file)
-        os.chmod(name, 0o666 & ~_umask())  # a temporary file is private, a result is not
         os.replace(name, target)
     except BaseException as error:
         with suppress(OSError):
@@ -106,9 +106,3 @@ def _write_whole(path: Path, write: Callable[[IO[bytes]], object]) -> None:
         if isinstance(error, OSError):
             raise ValueError(f"{path}: cannot be written: {error.strerror}.") from error
         raise
-
-
-def _umask() -> int:
-    current = os.umask(0)
-    os.umask(current)
-    return current

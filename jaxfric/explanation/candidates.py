@@ -50,11 +50,9 @@ class Field:
         # With all the signals that there will be, since programs are compiled for these.
         none = np.zeros(evidence.motion.num_samples)
         seen = evidence.with_channels(**dict.fromkeys(PREDICTED, none))
-        self._kept = {
-            id(candidate): begin(functools.partial(_columns, seen), candidate)
-            for candidate in self.candidates
-            if not candidate.term.coordinates & PREDICTED
-        }
+        own = [each for each in self.candidates if not each.term.coordinates & PREDICTED]
+        started = begin(functools.partial(_columns, seen), own)
+        self._kept = dict(zip(map(id, own), started, strict=True))
 
     def serves(self, evidence: Evidence) -> bool:
         """Whether the columns are those of other evidence too: the same rows of the same motion.

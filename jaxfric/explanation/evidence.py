@@ -157,7 +157,7 @@ def _columns(form, betas, numbers, motion):
     return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (len(betas), *x.shape)), alone)
 
 
-_compiled = programs.kept(_columns, optimised=programs.LITTLE)
+_compiled = programs.compiled(_columns, optimised=programs.LITTLE)
 
 
 def _renumbered(part: Any, number: Callable[[float], Any]) -> Any:
@@ -272,7 +272,7 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
     return dataclasses.replace(padded, channels=whole.channels), smoothed
 
 
-_scales = programs.kept(signals.scales)
+_scales = programs.compiled(signals.scales)
 
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
 # axis hardly accelerates, the noise of its acceleration would ask for wider ones.

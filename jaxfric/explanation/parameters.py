@@ -52,7 +52,7 @@ def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[s
     return result
 
 
-_wave = programs.kept(wave)
+_wave = programs.compiled(wave)
 
 
 def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:

@@ -11,9 +11,8 @@ import jax
 _Item = TypeVar("_Item")
 _Made = TypeVar("_Made")
 
-# What is waited for goes first come, first served, so that a task may wait for an earlier one. Two
-# threads use both cores of a small machine; of more, Python itself lets only one go on at a time.
-_pool = ThreadPoolExecutor(2, "jaxfric")
+# Both cores of a small machine; of more threads, Python itself lets only one go on at a time.
+THREADS = 2
 # Whoever is in [`single`][], and what the first of them has changed.
 _lock = Lock()
 _inside = 0
@@ -45,14 +44,17 @@ def single() -> Iterator[None]:
                 _limits.restore_original_limits()
 
 
-def begin(function: Callable[[_Item], _Made], item: _Item) -> "Future[_Made]":
-    """Start a call that the caller does not wait for yet."""
-    return _pool.submit(_double, function, item)
+def begin(function: Callable[[_Item], _Made], items: Iterable[_Item]) -> "list[Future[_Made]]":
+    """Start a function of each item, of several at once, that the caller does not wait for yet."""
+    pool = ThreadPoolExecutor(THREADS, "jaxfric")
+    started = [pool.submit(_double, function, item) for item in items]
+    pool.shutdown(wait=False)  # its threads end with the last item
+    return started
 
 
 def each(function: Callable[[_Item], _Made], items: Iterable[_Item]) -> list[_Made]:
-    """A function of each item, of several at once; not from inside such a function."""
-    started = [begin(function, item) for item in items]
+    """A function of each item, of several at once."""
+    started = begin(function, items)
     try:
         return [made.result() for made in started]
     finally:

@@ -106,7 +106,7 @@ def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identi
     return jax.lax.map(one, recording, batch_size=together)
 
 
-solve_rows = programs.kept(_solve_rows)
+solve_rows = programs.compiled(_solve_rows)
 
 
 class _Sought(NamedTuple):
@@ -117,6 +117,7 @@ class _Sought(NamedTuple):
     found: Found
 
 
+@programs.compiled
 def _seek(term, recording, projection, width, given, grid) -> _Sought:
     """The nonlinear parameters."""
     recording = _sanitised(recording)
@@ -131,6 +132,7 @@ def _seek(term, recording, projection, width, given, grid) -> _Sought:
     return _Sought(limits, rows, search(active, recording, rows, box, grid, alike))
 
 
+@programs.compiled
 def _judge(
     sought: _Sought, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
@@ -249,7 +251,9 @@ def _outside(rival, beta, matrix) -> Bool[Array, ""]:
     return jnp.any(jnp.abs(rival - beta) > bound * errors)
 
 
-_identify = programs.kept(_seek, _judge)
+def _identify(*question) -> tuple[Identified, Design]:
+    """What a [`Question`][] about one recording asks, in two programs."""
+    return _judge(_seek(*question), *question)
 
 
 class _Judged(NamedTuple):

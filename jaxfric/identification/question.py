@@ -55,7 +55,7 @@ def ask(
 
 
 # Scales of a recording on the host.
-_scales = programs.kept(signals.scales)
+_scales = programs.compiled(signals.scales)
 
 
 def _plan(term, recording, projection, given) -> grids.Plan | None:

@@ -65,7 +65,7 @@ class Standing(NamedTuple):
     curve: np.ndarray
 
 
-@programs.kept
+@programs.compiled
 def _projected(recording: Recording, width: int):
     limits = signals.scales(recording)
     rows = WeakForm(width).rows(recording, limits)

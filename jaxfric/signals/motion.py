@@ -86,7 +86,7 @@ def counter_velocity(
     return velocity.at[0].set(velocity[1])
 
 
-@programs.kept
+@programs.compiled
 def _host_facts(recording):
     limits, position = scales(recording), recording.position
     typical = limits.interval

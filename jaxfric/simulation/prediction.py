@@ -146,7 +146,7 @@ def delay_of(model: Model) -> float:
     return 0.0 if delay is None else float(delay)
 
 
-_scales = programs.kept(signals.scales)
+_scales = programs.compiled(signals.scales)
 
 
 def residual(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:

@@ -197,7 +197,6 @@ def _serve(pipe: Connection, do, prepare) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it ends it
     if prepare is not None:
         prepare()
-    gc.enable()  # which the command line's own preparation leaves to its caller
     try:
         pipe.send(True)
         while True:
