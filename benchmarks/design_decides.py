@@ -26,6 +26,7 @@ from jaxfric.terms.effects import EFFECTS as CATALOGUE
 jax.config.update("jax_enable_x64", True)
 LIMITS = Limits(0.1, 0.15, 2.0, 60.0, 12.0, 0.004)
 MASS, BANDWIDTH = 4.0, 60.0
+FRESH = 4
 EFFECTS = (
     "spring", "hardening_spring", "gravity_unbalance", "cogging", "periodic_disturbance",
     "position_dependent_friction", "sticky_spot", "end_stop",
@@ -176,8 +177,12 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("decides.json"))
     arguments = parser.parse_args()
-    seen, seed = [], 10_000 * arguments.seed
+    # What an interrupted run has written stays.
+    seen = json.loads(arguments.out.read_text())["cases"] if arguments.out.exists() else []
+    seed = 10_000 * arguments.seed + len(seen)
     while sum(c["case"] for c in seen) < arguments.cases:
+        if seed % FRESH == 0:  # each structure is a program: the process runs out of memory maps
+            jax.clear_caches()
         try:
             one = case(seed)
         except ValueError as error:

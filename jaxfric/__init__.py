@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         explain as explain,
     )
     from .identification import devices as devices
+    from .identification.breakaway import BreakAway as BreakAway, breakaway as breakaway
     from .identification.constant_velocity import (
         ConstantVelocity as ConstantVelocity,
         constant_velocity as constant_velocity,
@@ -59,6 +60,7 @@ _NAMES = {
     "data.io": ("read",),
     "data.recording": ("Recording", "pad", "stack"),
     "explanation": ("Earlier", "Explanation", "explain"),
+    "identification.breakaway": ("BreakAway", "breakaway"),
     "identification.constant_velocity": ("ConstantVelocity", "constant_velocity"),
     "identification.identified": ("Identified", "Result"),
     "identification.identifying": ("identify",),

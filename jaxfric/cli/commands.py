@@ -19,6 +19,7 @@ from ..data.io import read_with_notes, write_bytes, write_table, write_text
 from ..data.recording import Recording, uniform
 from ..data.writing import csv_text
 from ..identification import documents, tabulate
+from ..identification.breakaway import breakaway
 from ..identification.constant_velocity import constant_velocity
 from ..identification.identified import Identified
 from ..identification.identifying import identify as identify_recording
@@ -160,15 +161,15 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
         standings = select(recording, path)
         name, chosen = standings.name, {"selection": standings.to_dict()}
     name, found = fitted(recording, name, arguments.projection, arguments.bounds)
-    test = constant_velocity(recording, found)
+    test, stick = constant_velocity(recording, found), breakaway(recording, found)
     error = force_error(found.model, recording)
-    document = documents.identification(found, recording, notes, test, error)
+    document = documents.identification(found, recording, notes, test, error, stick)
     document |= {"name": name} | chosen
     if arguments.save or arguments.plot:
         if not np.any(np.isfinite(np.asarray(found.model.alpha))):
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
     if arguments.save:
-        put(arguments.save, documents.to_json(documents.saved(found.model, recording)))
+        put(arguments.save, documents.to_json(documents.saved(stick.model, recording)))
     if arguments.plot:
         draw(found, recording, arguments.plot)
     return document

@@ -119,8 +119,8 @@ def constant_velocity(recording: Recording, found: Any = None) -> ConstantVeloci
     if signals.is_traced(recording):
         raise ValueError("constant_velocity reads values: call it outside of jax.jit.")
     log = jax.tree.map(np.asarray, signals.prepare(recording))
-    force = np.asarray(log.force, float) - _beyond(found, log)
-    slowest = _slowest(log)
+    force = np.asarray(log.force, float) - beyond(found, log)
+    slowest = slowest_slip(log)
     stretches = steady(log, force, slowest)
     groups = _groups(stretches)
     mass = _mass(found)
@@ -128,7 +128,7 @@ def constant_velocity(recording: Recording, found: Any = None) -> ConstantVeloci
     return ConstantVelocity(tuple(points), tuple(_gaps(log, stretches, points, slowest)))
 
 
-def _slowest(log: Recording) -> float:
+def slowest_slip(log: Recording) -> float:
     """The smallest speed resolved as slip, m/s, as `signals.scales` has it, on the host."""
     velocity = np.asarray(log.velocity, float)[np.asarray(log.mask)]
     velocity = velocity[np.isfinite(velocity)]
@@ -145,7 +145,7 @@ def _mass(found: Any) -> float:
     return abs(value) if np.isfinite(value) else 0.0
 
 
-def _beyond(found: Any, log: Recording) -> np.ndarray | float:
+def beyond(found: Any, log: Recording) -> np.ndarray | float:
     """What the terms beyond velocity say, N, `(N,)`."""
     if found is None or found.model.term.coordinates <= {"velocity", "acceleration"}:
         return 0.0

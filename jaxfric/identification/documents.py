@@ -11,6 +11,7 @@ from ..data.recording import Recording, uniform
 from ..data.summary import facts
 from ..models import name_of
 from ..signals import interval, kernel_half_width, prepare
+from . import breakaway
 from .constant_velocity import ConstantVelocity, remark as contradicts, sentence
 
 IDENTIFICATION = "jaxfric.identification/1"
@@ -22,6 +23,7 @@ def identification(
     notes: Sequence[str] = (),
     test: ConstantVelocity | None = None,
     force_error: float | None = None,
+    stick: breakaway.BreakAway | None = None,
 ) -> dict[str, Any]:
     """An `Identified` as plain data (schema `jaxfric.identification/1`).
 
@@ -29,7 +31,8 @@ def identification(
     its facts are told as well; its constant-velocity `test`, which may warn; `force_error` of
     `predict` with the model and the recording, for what was identified through the kernel that is
     chosen from the recording: then `filter_half_width`, s, is that kernel's, through which the rows
-    of `filtered_force_error` went. Both are null where it was not computed.
+    of `filtered_force_error` went. Both are null where it was not computed. `stick`: the break-away
+    levels, which the model then holds.
     """
     parameters = {
         name: {
@@ -46,7 +49,7 @@ def identification(
         "schema": IDENTIFICATION,
         "name": name_of(found.model.term),
         "recording": {} if recording is None else facts(recording, notes),
-        "model": found.model.to_dict(),
+        "model": (found if stick is None else stick).model.to_dict(),
         "parameters": parameters,
         "projection": found.projection,
         "windows": int(found.windows),
@@ -64,6 +67,8 @@ def identification(
     }
     if test is not None:
         document["constant_velocity"] = test.to_dict() | {"summary": sentence(test, units)}
+    if stick is not None:
+        document["breakaway"] = stick.to_dict() | {"summary": breakaway.sentence(stick, units)}
     return document
 
 

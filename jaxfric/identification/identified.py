@@ -16,6 +16,7 @@ from ..looks.text import Block
 from ..models import Model
 from ..units import VELOCITY, spell
 from . import batch, curves, documents, tabulate, uncertainty
+from .breakaway import breakaway
 from .constant_velocity import constant_velocity
 from .uncertainty import Estimate
 
@@ -177,8 +178,8 @@ class Identified(eqx.Module):
         """The identified friction over velocity with its 95 % band, by matplotlib.
 
         **Arguments:** `recording` that it was identified from: then the measured force less
-        inertia is drawn beside it, over the recorded speeds, and the mean force at constant
-        velocity; `ax`, matplotlib's axes to draw on.
+        inertia is drawn beside it, over the recorded speeds, the mean force at constant velocity,
+        and the break-away levels; `ax`, matplotlib's axes to draw on.
 
         **Returns:** the axes.
 
@@ -194,6 +195,7 @@ class Identified(eqx.Module):
             prepared = curves.prepared(recording)
             sides = curves.measured(self, prepared, curves.rows(self, prepared))
             drawing.held(axes, constant_velocity(recording, self))
+            drawing.broken_away(axes, breakaway(recording, self))
         drawing.friction(axes, sides, units, spell(VELOCITY, units), curves.name(source))
         return axes
 
@@ -207,7 +209,8 @@ class Identified(eqx.Module):
         if self.covariance.ndim != 2:
             raise ValueError(f"to_dict() is of one identification. {text.A_ROW}")
         test = None if recording is None else constant_velocity(recording, self)
-        document = documents.identification(text.on_host(self), recording, test=test)
+        stick = None if recording is None else breakaway(recording, self)
+        document = documents.identification(text.on_host(self), recording, test=test, stick=stick)
         return documents.finite(document)
 
     def to_pandas(self):

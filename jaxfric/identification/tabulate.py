@@ -57,8 +57,9 @@ def identified(
     """The paragraphs and the table of [`identification`][]; the recording may be absent."""
     result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
-    if said := document.get("constant_velocity", {}).get("summary"):
-        told.append(said)
+    for evidence in ("constant_velocity", "breakaway"):
+        if said := document.get(evidence, {}).get("summary"):
+            told.append(said)
     if document["result"] != "not_passive":
         told += _remarks(document["parameters"])
     chosen = standings(document["selection"]) if "selection" in document else []

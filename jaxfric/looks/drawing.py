@@ -110,6 +110,19 @@ def held(axes, test: Any) -> None:
         label = None
 
 
+def broken_away(axes, test: Any) -> None:
+    """The break-away levels at zero velocity with their intervals.
+
+    **Arguments:** `test`: its `levels`, as of `identification`.
+    """
+    label: str | None = "break-away"
+    for level in test.levels:
+        reach = [[level.value - level.low], [level.high - level.value]]
+        style = {"fmt": "^" if level.direction > 0 else "v", "mfc": "w", "ms": 6, "capsize": 4}
+        axes.errorbar(0.0, level.value, reach, color="#5b2a86", label=label, zorder=5, **style)
+        label = None
+
+
 def plain(words: str) -> str:
     """Text in which matplotlib reads no formula; it comes from files."""
     return words.replace("$", r"\$")

@@ -7,6 +7,7 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording
 from ..identification import curves
+from ..identification.breakaway import breakaway
 from ..identification.constant_velocity import constant_velocity
 from ..identification.identified import Identified
 from ..looks import drawing
@@ -37,6 +38,7 @@ def figure(found: Identified, recording: Recording):
     units = prepared.unit_names
     sides = curves.measured(found, prepared, rows)
     drawing.held(curve, constant_velocity(prepared, found))
+    drawing.broken_away(curve, breakaway(prepared, found))
     drawing.friction(curve, sides, units, spell(VELOCITY, units), curves.name(recording.source))
     _time(time, rest, rows, units["force"])
     time.set_title(
