@@ -358,7 +358,7 @@ def test_a_fit_is_drawn_with_and_without_its_recording(fit, recording, pyplot):
     assert fit.plot(recording, ax=given) is given
     assert "Friction of scenario" in words(given)
     said = [each.get_text() for each in given.get_legend().get_texts()]
-    assert len(said) == 5 and sum("constant velocity" in each for each in said) == 2
+    assert len(said) == 6 and sum("constant velocity" in each for each in said) == 2
     # At the fastest recorded speed the curve ends.
     assert max(given.lines[-3].get_xdata()) <= 1.01 * float(np.max(np.abs(recording.velocity)))
 
