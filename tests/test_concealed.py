@@ -10,7 +10,7 @@ from jaxfric import models
 from jaxfric.terms.effects import EFFECTS
 from jaxfric.validation import concealed
 from jaxfric.validation.concealed import drawing, tuning
-from jaxfric.validation.concealed.kinds import KINDS
+from jaxfric.validation.concealed.kinds import PHYSICS
 from jaxfric.validation.concealed.nominal import friction, rms
 from jaxfric.validation.concealed.tuning import in_loop
 from jaxfric.validation.proof import planning
@@ -56,7 +56,7 @@ NOT_DRAWN = {"parameter_mismatch", "payload_change", "gain_step"}
 
 
 def test_every_effect_of_the_catalogue_can_be_concealed_but_those_that_are_named():
-    assert set(concealed.NAMES) == set(EFFECTS) - NOT_DRAWN
+    assert set(concealed.names()) == set(EFFECTS) - NOT_DRAWN
     assert not set(concealed.OUTSIDE) & set(EFFECTS)
 
 
@@ -127,7 +127,7 @@ def check(name, seed, machine, run):
     assert np.ptp(position) > 0.6 * machine.plan.stroke
     assert rms(slip_residual(machine, run)) < 1.4 * expected_noise(machine)
     size = machine.truth[name]["size"]
-    force = hidden - np.mean(hidden) if KINDS[name].centred else hidden
+    force = hidden - np.mean(hidden) if PHYSICS[name].centred else hidden
     acting = in_loop(machine, name, force, run.true[0].velocity)
     most = 4.0 if name in IN_SLIP else 1.6
     assert size / 1.6 < acting < most * size, (name, seed, size, acting)
@@ -140,7 +140,7 @@ def test_an_effect_is_there_and_as_large_as_drawn(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", PHYSICS)
 def test_every_effect_is_there_and_as_large_as_drawn(name):
     for seed in (101, 103, 105):
         machine = concealed.draw(seed, (name,), SIZE)

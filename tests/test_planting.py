@@ -43,7 +43,7 @@ def test_the_effects_take_turns_in_every_log_and_size():
     planted = [c for c in cases if c.effects]
     assert len(planted) == 16 and len({c.name for c in planted}) == 16
     names = [c.effects[0] for c in planted]
-    assert set(names[: len(planting.PLANTED)]) == set(planting.PLANTED)
+    assert set(names[: len(planting.planted())]) == set(planting.planted())
     assert [c.size[0] for c in planted[:8]] == [0.05] * 4 + [0.1] * 4
     assert planting.plan(LOGS, (0.05, 0.1), 4, 1) == cases
 
@@ -62,13 +62,13 @@ def test_a_plan_of_nothing_is_refused():
 # What is planted
 
 
-@pytest.mark.parametrize("name", planting.PLANTED)
+@pytest.mark.parametrize("name", planting.planted())
 def test_the_force_has_its_size(recording, name):
     case = proof.Case("a-001", "single", 5, (name,), (0.1, 0.1))
     truth, (force, held) = planting.plant(recording, recording, LEVEL, name, case)
     assert truth["size"] == pytest.approx(0.1, rel=0.3)
     # Of a spring or a weight the mean is the baseline's offset.
-    size = np.std(force) if planting.KINDS[name].centred else np.sqrt(np.mean(force**2))
+    size = np.std(force) if planting.kind(name).centred else np.sqrt(np.mean(force**2))
     assert size == pytest.approx(truth["size"] * 20, rel=1e-6)
     if name == "disturbance_pulses":  # pushes come at other times
         assert np.max(np.abs(held - force)) > 0.1 * np.max(np.abs(force))

@@ -14,7 +14,7 @@ import pytest
 from jaxfric.cli import main
 from jaxfric.terms.effects import effect
 from jaxfric.validation import proof
-from jaxfric.validation.concealed import NAMES, OUTSIDE
+from jaxfric.validation.concealed import OUTSIDE, names
 from jaxfric.validation.proof import counting, running, scoring, trials, workers
 
 RANGE = (0.02, 0.3)
@@ -60,19 +60,19 @@ def test_the_plan_is_the_seeds_and_longer_ones_go_on_from_it():
 
 
 def test_the_plan_is_balanced():
-    cases = proof.plan(24 * len(NAMES), 1, RANGE)
+    cases = proof.plan(24 * len(names()), 1, RANGE)
     kinds = Counter(c.kind for c in cases)
-    count = len(NAMES)
+    count = len(names())
     assert kinds == {
         "healthy": 8 * count, "single": 12 * count, "pair": 3 * count, "outside": count
     }  # fmt: skip
     assert all(c.effects == () for c in cases if c.kind == "healthy")
     singles = Counter(c.effects[0] for c in cases if c.kind == "single")
-    assert singles == dict.fromkeys(NAMES, 12)
+    assert singles == dict.fromkeys(names(), 12)
     outside = Counter(c.effects[0] for c in cases if c.kind == "outside")
     assert set(outside) == set(OUTSIDE) and max(outside.values()) - min(outside.values()) <= 1
     members = Counter(name for c in cases if c.kind == "pair" for name in c.effects)
-    assert set(members) == set(NAMES) and max(members.values()) <= 2 * min(members.values())
+    assert set(members) == set(names()) and max(members.values()) <= 2 * min(members.values())
 
 
 def test_no_pair_is_declared_confusable():

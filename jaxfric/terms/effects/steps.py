@@ -16,6 +16,8 @@ from ..time import FrictionStep, GainStep, PayloadChange
 # A step in friction cannot be dated better than to about one kernel of the weak form, some
 # thousandths of the record.
 RAMP_SHARE = 0.005
+# Machines whose mass or gain changes while they run are not drawn: of a seed of `prove` every case
+# stays what it was before these effects.
 
 
 def _ramp(scales: Scales) -> float:
@@ -76,6 +78,7 @@ PAYLOAD_CHANGE = Effect(
     grid=moments,
     variant=weighed,
     moment="step_time",
+    drawn=False,
 )
 GAIN_STEP = Effect(
     "gain_step",
@@ -92,4 +95,5 @@ GAIN_STEP = Effect(
     momentary=True,
     grid=moments,
     moment="step_time",
+    drawn=False,
 )

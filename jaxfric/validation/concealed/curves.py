@@ -23,13 +23,24 @@ def _asymmetric(truth, base):
     }
 
 
+def _asymmetry(truth, n):
+    return truth["viscous_asymmetry"] * np.abs(n.v)
+
+
+def _all_asymmetry(truth, n):
+    return _asymmetry(truth, n) + truth["coulomb_asymmetry"] * np.abs(n.way)
+
+
 ASYMMETRY: Kind = Kind(
     _draw_asymmetry,
     # Coulomb asymmetry is a constant in slip, but for dwells: the size is that of the viscous part.
-    lambda truth, n: truth["viscous_asymmetry"] * np.abs(n.v),
+    _asymmetry,
     _asymmetric,
     lambda truth: "viscous friction differs between the directions",
     centred=True,
+    tied=True,
+    inside=True,
+    total=_all_asymmetry,
 )
 
 
@@ -60,6 +71,9 @@ STRIBECK: Kind = Kind(
     ),
     _stribeck,
     lambda truth: f"speeds below {3 * truth['stribeck_velocity']:.3g}",
+    bump=False,
+    inside=True,
+    planted=True,
 )
 
 
@@ -94,6 +108,7 @@ VISCOUS: Kind = Kind(
     _viscous_force,
     lambda truth, base: _FORMS[truth["form"]](truth, base),
     lambda truth: "curvature of friction over speed",
+    planted=True,
 )
 
 
@@ -102,6 +117,8 @@ LOADED: Kind = Kind(
     lambda truth, n: truth["load_friction"] * np.abs(n.u) * n.way,
     named(load_friction="load_friction"),
     lambda truth: "force by direction",
+    loud=True,
+    follows=False,
 )
 
 
@@ -117,6 +134,8 @@ RATED: Kind = Kind(
     ),
     named(acceleration_friction="level", acceleration_scale="acceleration_scale"),
     lambda truth: "friction that grows with acceleration of either sign",
+    loud=True,
+    follows=False,
 )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.random import Generator
 
-from .kinds import KINDS
+from .kinds import kind
 from .machines import (
     SHAPES,
     Machine,
@@ -21,17 +21,10 @@ from .machines import (
     reference,
     tied,
 )
-from .nominal import nominal
+from .nominal import Kind, nominal
 from .physics import ABSENT
 from .tuning import BURST, tune
 
-# What the phase of the loop, or a large force of inertia, makes visible.
-_DYNAMIC = {
-    "transport_delay", "actuator_lag", "position_dependent_delay", "compliance",
-    "position_dependent_inertia", "load_dependent_friction", "actuator_saturation",
-    "gain_asymmetry", "acceleration_dependent_friction", "actuator_deadband",
-}  # fmt: skip
-_PHASE = {"transport_delay", "actuator_lag", "position_dependent_delay"}
 # How often a loop that bursts is made half as fast before it is given up.
 _SLOWER = 4
 
@@ -43,7 +36,7 @@ def draw(
 
     **Arguments:** `seed`, zero or more: the same seed is the same machine, whatever is concealed,
     but for what an effect needs to be seen (a large inertia, a slow loop); `effects`, names out of
-    [`NAMES`][] or [`OUTSIDE`][]; `size`, the root mean square of an effect's force over the
+    [`names`][] or [`OUTSIDE`][]; `size`, the root mean square of an effect's force over the
     set-point's motion in parts of the Coulomb level: one number, or the range of a log-uniform
     draw. What would not be physical any more is not made, so that the size in `Machine.truth` can
     be smaller.
@@ -54,26 +47,26 @@ def draw(
     that bursts however slow.
     """
     effects = tuple(effects)
-    _check(effects)
+    kinds = _checked(effects)
     rng = np.random.default_rng((seed, 0))
     plan = draw_plan(rng, seed)
     time = np.arange(plan.samples) / plan.sample_rate
     x, v = reference(plan, seed, 0)
     coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))
-    shape = _shape(rng, effects)
+    shape = _shape(rng, kinds)
     friction = draw_friction(rng, coulomb, top, shape)
-    if "asymmetric_friction" in effects:
+    if any(kind.tied for kind in kinds):
         friction = tied(friction)
-    if "frictional_lag" in effects:
+    if any(kind.bump for kind in kinds):
         friction = _pronounced(friction, coulomb, top)
-    omega = draw_band(rng, plan, slowest=bool(_PHASE & set(effects)))
-    baseline = shape if shape and "stribeck" not in effects else "coulomb-viscous"
-    if "asymmetric_friction" in effects:
+    omega = draw_band(rng, plan, slowest=any(kind.slow for kind in kinds))
+    baseline = shape or "coulomb-viscous"
+    if any(kind.tied for kind in kinds):
         baseline = f"symmetric-{baseline}"
 
     def driven(rng, omega) -> Machine:
         # Coulomb friction may bend the loop by a twentieth of the stroke.
-        mass = max(_mass(rng, v, time, coulomb, effects), 20 * coulomb / (plan.stroke * omega**2))
+        mass = max(_mass(rng, v, time, coulomb, kinds), 20 * coulomb / (plan.stroke * omega**2))
         loop, noise = draw_loop(rng, mass, coulomb, omega, plan)
         physics = {**ABSENT, "mass": mass, **friction, **loop, "still": 1e-3 * top}
         # Far above what the motion needs: a limit that is met would be an effect of its own.
@@ -96,31 +89,26 @@ def _with(machine: Machine, effects, n, size) -> Machine:
     """The machine with effects, one after the other: each knows the friction of those before."""
     for name in effects:
         truth = _conceal(machine, name, n, size)
-        physics = {**machine.physics, **KINDS[name].physics(truth, machine.physics)}
+        physics = {**machine.physics, **kind(name).physics(truth, machine.physics)}
         both = (*machine.effects, name), {**machine.truth, name: truth}
         machine = dataclasses.replace(machine, effects=both[0], physics=physics, truth=both[1])
         n = n._replace(physics=physics)
     return machine
 
 
-def _check(effects):
-    unknown = [name for name in effects if name not in KINDS]
-    if unknown:
-        raise ValueError(
-            f"No effect {', '.join(unknown)} can be concealed; there are {', '.join(KINDS)}."
-        )
+def _checked(effects) -> list[Kind]:
     if len(set(effects)) < len(effects):
         raise ValueError(f"An effect is named twice: {', '.join(effects)}.")
+    return [kind(name) for name in effects]
 
 
-def _shape(rng: Generator, effects) -> str | None:
-    """The healthy machine's Stribeck curve, or `None`; one where friction's lag is to be seen."""
+def _shape(rng: Generator, kinds: Sequence[Kind]) -> str | None:
+    """The healthy machine's Stribeck curve, or `None`; as an effect wants it, where one does."""
     choice = (*SHAPES, None)[rng.integers(4)]
-    if "stribeck" in effects:
+    wanted = {kind.bump for kind in kinds}
+    if False in wanted:
         return None
-    if "frictional_lag" in effects and choice is None:
-        return SHAPES[0]
-    return choice
+    return SHAPES[0] if True in wanted and choice is None else choice
 
 
 def _pronounced(friction, coulomb, top):
@@ -130,10 +118,10 @@ def _pronounced(friction, coulomb, top):
     return friction | wide
 
 
-def _mass(rng: Generator, v, time, coulomb, effects) -> float:
+def _mass(rng: Generator, v, time, coulomb, kinds) -> float:
     """The force of inertia (98 % of it) is 0.3 to 5 times Coulomb friction."""
     ratio = log_uniform(rng, 0.3, 5.0)
-    if _DYNAMIC & set(effects):
+    if any(kind.loud for kind in kinds):
         ratio = max(ratio, 1.5 + 0.5 * ratio)
     return ratio * coulomb / float(np.quantile(np.abs(np.gradient(v, time)), 0.98))
 
@@ -141,8 +129,8 @@ def _mass(rng: Generator, v, time, coulomb, effects) -> float:
 def _conceal(machine, name, n, size):
     rng = np.random.default_rng((machine.seed, 1, zlib.crc32(name.encode())))
     low, high = size if isinstance(size, tuple) else (size, size)
-    kind, wanted = KINDS[name], log_uniform(rng, low, high)
-    truth = kind.draw(rng, n, wanted)
-    if kind.tuned:
+    own, wanted = kind(name), log_uniform(rng, low, high)
+    truth = own.draw(rng, n, wanted)
+    if own.tuned:
         truth = tune(machine, name, truth, n, wanted)
-    return {"size": kind.measure(truth, n), **truth, "where": kind.where(truth)}
+    return {"size": own.measure(truth, n), **truth, "where": own.where(truth)}

@@ -1,14 +1,45 @@
 """Everything that can be concealed, by name."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+from ...terms.effect import ANY
+from ...terms.effects import EFFECTS
 from . import curves, memories, places, schedule
 from .nominal import Kind
+from .own import by_law
 
-KINDS: Mapping[str, Kind] = {**curves.KINDS, **places.KINDS, **memories.KINDS, **schedule.KINDS}
+# Effects with physics of their own in the simulator, written apart from the library's laws.
+PHYSICS: Mapping[str, Kind] = {
+    **curves.KINDS, **places.KINDS, **memories.KINDS, **schedule.KINDS,
+}  # fmt: skip
 
 OUTSIDE = ("position_dependent_delay", "hysteretic_spring", "acceleration_dependent_friction")
 """Effects that the library has no term for."""
 
-NAMES = tuple(name for name in KINDS if name not in OUTSIDE)
-"""Effects that the library knows, by the names of `jaxfric effects`."""
+
+def names() -> tuple[str, ...]:
+    """The effects that take turns in `prove`, by the names of `jaxfric effects`.
+
+    Those with physics of their own in the simulator, then all others with a law.
+    """
+    known = [name for name in PHYSICS if name not in OUTSIDE]
+    others = [e.name for e in EFFECTS.values() if e.drawn and e.shapes(ANY)]
+    return (*known, *(name for name in others if name not in PHYSICS))
+
+
+def kind(name: str) -> Kind:
+    """How an effect is concealed.
+
+    **Raises:** `ValueError`, with the names there are, for one that cannot be.
+    """
+    if name in PHYSICS:
+        return PHYSICS[name]
+    if name in EFFECTS and EFFECTS[name].shapes(ANY):
+        return by_law(EFFECTS[name])
+    there = ", ".join((*names(), *OUTSIDE))
+    raise ValueError(f"No effect {name} can be concealed; there are {there}.")
+
+
+def unrepeated(effects: Iterable[str]) -> bool:
+    """Whether nobody can know the held-out force of an effect among these from the other run."""
+    return any(kind(name).unrepeated for name in effects)

@@ -42,6 +42,7 @@ PRESLIDING: Kind = Kind(
     lambda truth: f"within {3 * truth['presliding_distance']:.3g} after a reversal",
     tuned="presliding_distance",
     bounds=_bristle_bounds,
+    follows=False,
 )  # fmt: skip
 
 
@@ -57,6 +58,8 @@ FRICTION_LAG: Kind = Kind(
     lambda truth: "loops of friction over velocity at low speed",
     tuned="frictional_lag",
     bounds=lambda n: (n.substep, 0.03 * n.plan.period),
+    bump=True,
+    follows=False,
 )
 
 
@@ -80,6 +83,7 @@ HYSTERETIC: Kind = Kind(
         "hysteresis_distance": truth["distance"],
     },
     lambda truth: "a spring that gives back less than it took",
+    follows=False,
 )
 
 
@@ -106,12 +110,18 @@ DELAY: Kind = Kind(
     lambda truth, n: truth["delay"] * _rate(n),
     lambda truth, base: {"delay": truth["delay"]},
     lambda truth: "force rate",
+    loud=True,
+    slow=True,
+    follows=False,
 )
 LAG: Kind = Kind(
     lambda rng, n, size: scaled(LAG, "lag", {}, n, size, _slowest(n)),
     lambda truth, n: truth["lag"] * _rate(n),
     lambda truth, base: {"lag": truth["lag"]},
     lambda truth: "force rate",
+    loud=True,
+    slow=True,
+    follows=False,
 )
 
 
@@ -125,6 +135,9 @@ SWING: Kind = Kind(
     lambda truth, n: truth["delay"] * (1 + np.sin(TURN * n.x / truth["period"])) * _rate(n),
     lambda truth, base: {"delay_swing": truth["delay"], "delay_period": truth["period"]},
     lambda truth: "force rate by position",
+    loud=True,
+    slow=True,
+    follows=False,
 )
 
 DEADBAND: Kind = Kind(
@@ -132,6 +145,8 @@ DEADBAND: Kind = Kind(
     lambda truth, n: truth["deadband"] * np.sign(n.u),
     lambda truth, base: {"deadband": truth["deadband"]},
     lambda truth: "sign of the force",
+    loud=True,
+    follows=False,
 )
 
 
@@ -148,12 +163,16 @@ SATURATION: Kind = Kind(
     ),
     lambda truth, base: {"saturation": truth["saturation"], "knee": truth["knee"]},
     lambda truth: f"force beyond {truth['knee']:.3g}",
+    loud=True,
+    follows=False,
 )
 GAIN: Kind = Kind(
     lambda rng, n, size: scaled(GAIN, "gain_asymmetry", {}, n, size, 1.0),
     lambda truth, n: truth["gain_asymmetry"] * np.maximum(n.u, 0.0),
     lambda truth, base: {"gain": truth["gain_asymmetry"]},
     lambda truth: "positive force",
+    loud=True,
+    follows=False,
 )
 
 
@@ -231,6 +250,7 @@ BACKLASH: Kind = Kind(
     bounds=_gap_bounds,
     complete=_flanks,
     impacts=True,
+    follows=False,
 )
 
 
@@ -282,6 +302,8 @@ COMPLIANCE: Kind = Kind(
     # From what the substep resolves to the motion's own frequency.
     bounds=lambda n: (n.substep / 0.25, 0.25 * n.plan.period / TURN),
     complete=_stiffness,
+    loud=True,
+    follows=False,
 )
 
 KINDS = {

@@ -54,6 +54,14 @@ def _as_it_is(truth: Truth, n: Nominal) -> Truth:
     return truth
 
 
+class Columns(NamedTuple):
+    """Of a run, each `(N,)`: a load, N, and what friction has more, N and N·s/m."""
+
+    load: Any = 0.0
+    coulomb: Any = 0.0
+    viscous: Any = 0.0
+
+
 class Kind(NamedTuple):
     """One kind of concealed effect.
 
@@ -65,6 +73,16 @@ class Kind(NamedTuple):
     simulation, between `bounds(nominal)`; `complete` fills in what follows from it. With `impacts`,
     the size is that of the mean over the loop's time constant, in motion: a blow is high and says
     nothing, and at rest nobody knows on which flank the load lies.
+
+    Of the machine: `loud`, it shows by the phase of the loop, or where the force of inertia is
+    large; `slow`, it wants a slow loop; `tied`, both directions of the healthy machine are alike;
+    `bump`, whether that has a Stribeck curve, where it matters: a pronounced one, or none.
+
+    Of its force: `follows` from the motion at a sample; `inside` what the simulator takes for
+    friction; `total(truth, nominal)`, all of it, where `force` is a part; `planted`, it is one of
+    the recorded position, velocity and time alone; `added`, to the force of a machine that moves as
+    it would without. `over(truth, nominal, run)`: what acts because of the time; `unrepeated`, in
+    each run at moments of its own; `channels(truth, plan, run, clock)` that record it.
     """
 
     draw: Callable[[Generator, Nominal, float], Truth]
@@ -76,6 +94,18 @@ class Kind(NamedTuple):
     bounds: Callable[[Nominal], tuple[float, float]] = _unbounded
     complete: Callable[[Truth, Nominal], Truth] = _as_it_is
     impacts: bool = False
+    loud: bool = False
+    slow: bool = False
+    tied: bool = False
+    bump: bool | None = None
+    follows: bool = True
+    inside: bool = False
+    planted: bool = False
+    added: bool = False
+    unrepeated: bool = False
+    total: Callable[[Truth, Nominal], np.ndarray] | None = None
+    over: Callable[[Truth, Nominal, int], Columns] | None = None
+    channels: Callable[[Truth, Plan, int, np.ndarray], dict[str, np.ndarray]] | None = None
 
     def measure(self, truth: Truth, nominal: Nominal) -> float:
         """The size: root mean square of the force in parts of the Coulomb level."""

@@ -35,6 +35,7 @@ UNBALANCE: Kind = Kind(
     named(unbalance="amplitude", unbalance_period="unbalance_period", unbalance_phase="phase"),
     lambda truth: f"position, one turn in {truth['unbalance_period']:.4g}",
     centred=True,
+    planted=True,
 )
 
 
@@ -63,7 +64,11 @@ def _cogging(truth, base):
 
 
 COGGING: Kind = Kind(
-    _draw_cogging, _cogging_force, _cogging, lambda t: f"position, pitch {t['pitch']:.4g}"
+    _draw_cogging,
+    _cogging_force,
+    _cogging,
+    lambda t: f"position, pitch {t['pitch']:.4g}",
+    planted=True,
 )
 
 
@@ -78,6 +83,7 @@ SPRING: Kind = Kind(
     named(spring="stiffness", spring_rest="rest"),
     lambda truth: "position, over the whole stroke",
     centred=True,
+    planted=True,
 )
 
 
@@ -92,6 +98,7 @@ HARDENING: Kind = Kind(
     named(cubic="cubic_stiffness", cubic_centre="spring_centre"),
     lambda truth: "position, near both ends of the stroke",
     centred=True,
+    planted=True,
 )
 
 
@@ -136,6 +143,7 @@ STOP: Kind = Kind(
     tuned="depth",
     bounds=lambda n: (2e-3 * n.plan.stroke, 0.45 * n.plan.stroke),
     complete=_placed,
+    planted=True,
 )
 
 
@@ -156,6 +164,7 @@ WAVY: Kind = Kind(
         wavy_friction_phase="phase",
     ),
     lambda truth: f"position by direction, period {truth['friction_period']:.4g}",
+    planted=True,
 )
 
 
@@ -180,6 +189,7 @@ SPOT: Kind = Kind(
     ),
     named(spot="spot_force", spot_at="spot_position", spot_width="spot_width"),
     lambda truth: f"position by direction, at {truth['spot_position']:.4g}",
+    planted=True,
 )
 
 
@@ -202,6 +212,8 @@ INERTIA: Kind = Kind(
     _inertia_force,
     named(wavy_mass="amplitude", wavy_mass_period="inertia_period", wavy_mass_phase="phase"),
     lambda truth: f"position by acceleration, period {truth['inertia_period']:.4g}",
+    loud=True,
+    planted=True,
 )
 
 

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...data.recording import Recording
-from . import physics, schedule
-from .kinds import KINDS
+from . import physics
+from .kinds import kind
 from .machines import Machine, reference
-from .nominal import Nominal, direction, rms
+from .nominal import Columns, Nominal, direction, rms
 
 
 class Run(NamedTuple):
@@ -60,7 +60,9 @@ def simulate(runs: Sequence[tuple[Machine, int]]) -> list[Simulated]:
     found = []
     for i, (machine, run) in enumerate(runs):
         hidden = _hide(machine, clocks[i], true[i], staged[i][1], run)
-        found.append(Simulated(clocks[i], inputs[i], true[i], hidden))
+        added = _added(machine, clocks[i], true[i])
+        force = sum(added.values(), true[i].force)
+        found.append(Simulated(clocks[i], inputs[i], true[i]._replace(force=force), hidden | added))
     return found
 
 
@@ -101,12 +103,23 @@ def _stage(machine: Machine, run: int, clock: np.ndarray):
     interval = np.append(np.diff(clock), 1 / plan.sample_rate)
     # The mean of a slow load over a sample is its value in the middle.
     n = _motion(machine, clock + 0.5 * interval)
-    timed = schedule.columns(machine.truth, n, run)
+    timed = _timed(machine, n, run)
     correlation = noise.correlation * plan.sample_rate
     process = noise.process * _coloured(_rng(machine, run, 1), plan.samples, correlation)
     blur = noise.encoder * _rng(machine, run, 2).normal(size=plan.samples)
     columns = (interval, goal, speed, timed.load + process, timed.coulomb, timed.viscous, blur)
     return physics.Inputs(*columns), timed.load
+
+
+def _timed(machine: Machine, n: Nominal, run: int) -> Columns:
+    """What acts over a run because of the time; `n` needs the run's `time` and `plan` only."""
+    zero = np.zeros_like(n.time)
+    total = Columns(zero, zero, zero)
+    for name, truth in machine.truth.items():
+        over = kind(name).over
+        if over is not None:
+            total = Columns(*(a + b for a, b in zip(total, over(truth, n, run), strict=True)))
+    return total
 
 
 def _motion(machine: Machine, time, x=None, v=None, a=None) -> Nominal:
@@ -118,32 +131,30 @@ def _motion(machine: Machine, time, x=None, v=None, a=None) -> Nominal:
     return Nominal(time, x, v, a, zero, way, top, machine.coulomb, machine.physics, machine.plan)
 
 
-# Effects that are friction of the simulator's baseline, and so no part of `Motion.hidden`.
-_INSIDE = {"asymmetric_friction", "stribeck"}
-
-# Effects whose force at a sample does not follow from the motion at that sample.
-_DYNAMIC = {
-    "presliding", "frictional_lag", "backlash", "compliance", "transport_delay", "actuator_lag",
-    "actuator_deadband", "actuator_saturation", "gain_asymmetry", "position_dependent_delay",
-    "hysteretic_spring", "load_dependent_friction", "acceleration_dependent_friction",
-}  # fmt: skip
-
-
 def _hide(machine: Machine, clock, true: physics.Motion, load, run):
     """The force of each effect; what does not follow from the motion gets what the others leave.
 
     Two such effects at once share it: each is given half.
     """
-    names = machine.effects
+    names = [name for name in machine.effects if not kind(name).added]
     n = _driven(machine, clock, true)
-    known = {name: _known(name, machine, n, run) for name in names if name not in _DYNAMIC}
-    inside = [known[name] for name in names if name in _INSIDE]
+    known = {name: _known(name, machine, n, run) for name in names if kind(name).follows}
+    inside = [known[name] for name in names if kind(name).inside]
     total = sum(inside, true.hidden + load)
     if len(names) == 1:
         return {names[0]: total}
     rest = total - sum(known.values(), np.zeros_like(total))
     share = 1 / max(len(names) - len(known), 1)
     return {name: known.get(name, share * rest) for name in names}
+
+
+def _added(machine: Machine, clock, true: physics.Motion) -> dict[str, np.ndarray]:
+    """The force of each effect that the machine's motion does not feel."""
+    names = [name for name in machine.effects if kind(name).added]
+    if not names:
+        return {}
+    n = _driven(machine, clock, true)._replace(u=true.force)
+    return {name: kind(name).force(machine.truth[name], n) for name in names}
 
 
 def _driven(machine, clock, true):
@@ -156,24 +167,22 @@ def _driven(machine, clock, true):
 
 
 def _known(name, machine, n, run):
-    truth = machine.truth[name]
-    if name in ("disturbance_pulses", "cross_axis"):
-        return schedule.columns({name: truth}, n, run).load
-    force = KINDS[name].force(truth, n)
-    if name == "asymmetric_friction":
-        return force + truth["coulomb_asymmetry"] * np.abs(n.way)
-    return force
+    truth, own = machine.truth[name], kind(name)
+    if own.over is not None:
+        load, coulomb, viscous = own.over(truth, n, run)
+        return load + coulomb * n.way + viscous * n.v
+    return (own.total or own.force)(truth, n)
 
 
 def _log(machine: Machine, found: Simulated, run: int) -> Recording:
     clock = found.clock
     force = machine.noise.force * _rng(machine, run, 3).normal(size=clock.size)
     channels = {"reference": found.inputs.goal}
-    if "cross_axis" in machine.effects:
-        truth = machine.truth["cross_axis"]
-        speed, _ = schedule.neighbour(truth, machine.plan, run, clock)
-        noise = 1e-3 * rms(speed) * _rng(machine, run, 4).normal(size=clock.size)
-        channels["neighbour_velocity"] = speed + noise
+    for effect, truth in machine.truth.items():
+        recorded = kind(effect).channels
+        for role, signal in recorded(truth, machine.plan, run, clock).items() if recorded else ():
+            noise = 1e-3 * rms(signal) * _rng(machine, run, 4).normal(size=clock.size)
+            channels[role] = signal + noise
     name = f"machine {machine.seed}, {('identification', 'held out')[run]}"
     true = found.true
     return Recording(clock, true.force + force, true.counted, channels=channels, source=name)

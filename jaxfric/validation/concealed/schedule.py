@@ -4,23 +4,13 @@ Held-out runs keep their own clock: what is tied to it (a drift, a step, a tone)
 the same time after the start; pushes do not.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.polynomial import legendre
 
 from . import motions
-from .nominal import Kind, rms, scaled
+from .nominal import Columns, Kind, rms, scaled
 
 TURN = 2 * np.pi
-
-
-class Columns(NamedTuple):
-    """Of a run, each `(N,)`: a load, N, and what friction has more, N and N·s/m."""
-
-    load: np.ndarray
-    coulomb: np.ndarray
-    viscous: np.ndarray
 
 
 def _nothing(truth, base):
@@ -52,6 +42,8 @@ THERMAL: Kind = Kind(
     _thermal_force,
     _nothing,
     lambda truth: f"{truth['law']} friction over time, constant {truth['time_constant']:.3g} s",
+    planted=True,
+    over=lambda truth, n, run: Columns(**{truth["law"]: _thermal_factor(truth, n.time)}),
 )
 
 
@@ -68,6 +60,10 @@ STEP: Kind = Kind(
     lambda truth, n: truth["step_coulomb"] * n.way * (n.time > truth["step_time"]),
     _nothing,
     lambda truth: f"friction from {truth['step_time']:.4g} s on",
+    planted=True,
+    over=lambda truth, n, run: Columns(
+        coulomb=truth["step_coulomb"] * (n.time > truth["step_time"])
+    ),
 )
 
 
@@ -85,7 +81,14 @@ def _drift(truth, n):
     return legendre.legval(tau, [0.0, *truth["polynomials"]])
 
 
-DRIFT: Kind = Kind(_draw_drift, _drift, _nothing, lambda truth: "time, slowly")
+DRIFT: Kind = Kind(
+    _draw_drift,
+    _drift,
+    _nothing,
+    lambda truth: "time, slowly",
+    planted=True,
+    over=lambda truth, n, run: Columns(_drift(truth, n)),
+)
 
 
 def _draw_tone(rng, n, size):
@@ -96,13 +99,17 @@ def _draw_tone(rng, n, size):
     return scaled(TONE, "amplitude", truth, n, size)
 
 
+def _tone(truth, n):
+    return truth["amplitude"] * np.sin(TURN * truth["frequency"] * n.time + truth["phase"])
+
+
 TONE: Kind = Kind(
     _draw_tone,
-    lambda truth, n: (
-        truth["amplitude"] * np.sin(TURN * truth["frequency"] * n.time + truth["phase"])
-    ),
+    _tone,
     _nothing,
     lambda truth: f"time, {truth['frequency']:.4g} Hz",
+    planted=True,
+    over=lambda truth, n, run: Columns(_tone(truth, n)),
 )
 
 
@@ -129,7 +136,13 @@ def _pulses(truth, n, times="times"):
 
 
 PULSES: Kind = Kind(
-    _draw_pulses, _pulses, _nothing, lambda truth: f"time, {len(truth['times'])} isolated pushes"
+    _draw_pulses,
+    _pulses,
+    _nothing,
+    lambda truth: f"time, {len(truth['times'])} isolated pushes",
+    planted=True,
+    over=lambda truth, n, run: Columns(_pulses(truth, n, ("times", "times_holdout")[run])),
+    unrepeated=True,
 )
 
 
@@ -157,7 +170,18 @@ def _cross(truth, n, run=0):
     return truth["coupling_inertia"] * a + truth["coupling_viscous"] * v
 
 
-CROSS: Kind = Kind(_draw_cross, _cross, _nothing, lambda truth: "the other axis' motion")
+def _recorded(truth, plan, run, clock):
+    return {"neighbour_velocity": neighbour(truth, plan, run, clock)[0]}
+
+
+CROSS: Kind = Kind(
+    _draw_cross,
+    _cross,
+    _nothing,
+    lambda truth: "the other axis' motion",
+    over=lambda truth, n, run: Columns(_cross(truth, n, run)),
+    channels=_recorded,
+)
 
 
 KINDS = {
@@ -168,26 +192,3 @@ KINDS = {
     "disturbance_pulses": PULSES,
     "cross_axis": CROSS,
 }
-
-
-def columns(truths, n, run: int) -> Columns:
-    """What acts over a run because of the time, from the truth of every effect by name.
-
-    `n` needs the run's `time` and `plan` only.
-    """
-    zero = np.zeros_like(n.time)
-    load, coulomb, viscous = zero, zero, zero
-    for name, truth in truths.items():
-        if name == "thermal_drift":
-            factor = _thermal_factor(truth, n.time)
-            viscous = viscous + (factor if truth["law"] == "viscous" else 0.0)
-            coulomb = coulomb + (factor if truth["law"] == "coulomb" else 0.0)
-        elif name == "friction_step":
-            coulomb = coulomb + truth["step_coulomb"] * (n.time > truth["step_time"])
-        elif name == "disturbance_pulses":
-            load = load + _pulses(truth, n, ("times", "times_holdout")[run])
-        elif name == "cross_axis":
-            load = load + _cross(truth, n, run)
-        elif name in ("load_drift", "periodic_disturbance"):
-            load = load + KINDS[name].force(truth, n)
-    return Columns(load, coulomb, viscous)

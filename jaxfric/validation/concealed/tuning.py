@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from .kinds import KINDS
+from .kinds import kind as kind_of
 from .machines import Machine
 from .nominal import Nominal, Truth, rms
 from .runs import simulate
@@ -45,7 +45,7 @@ def _improved(machine, name, truth, n, size, step):
     identification's motion; size over parameter is taken as a power law between and, by no more
     than another step, beyond them.
     """
-    kind = KINDS[name]
+    kind = kind_of(name)
     low, high = kind.bounds(n)
     first = truth[kind.tuned]
     tried = np.clip([first / step, first * step], low, high)
@@ -65,7 +65,7 @@ def _improved(machine, name, truth, n, size, step):
 
 def _sizes(machine, name, truths):
     """Of the effect's force in the closed loop, in parts of the Coulomb level."""
-    kind = KINDS[name]
+    kind = kind_of(name)
     twins = [
         dataclasses.replace(
             machine,
@@ -84,7 +84,7 @@ def _sizes(machine, name, truths):
 
 def in_loop(machine: Machine, name: str, force: np.ndarray, velocity: np.ndarray) -> float:
     """Size of an effect's force along a run in closed loop, in parts of the Coulomb level."""
-    if KINDS[name].impacts:
+    if kind_of(name).impacts:
         physics = machine.physics
         window = machine.plan.sample_rate / np.sqrt(physics["kp"] / physics["mass"])
         count = max(round(window), 1)

@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..concealed.kinds import unrepeated
 from .planning import Case
 from .scoring import Score, held_out, score
-from .trials import ANSWERS, SEALED, UNREPEATED, failed, path, read
+from .trials import ANSWERS, SEALED, failed, path, read
 
 # Parameters that say where a finding is: two with others are two findings.
 PLACES = ("pitch", "unbalance_period", "friction_period", "inertia_period", "frequency",
@@ -36,7 +37,7 @@ def scores(folder: Path, cases: Sequence[Case]) -> list[Score]:
             answer = answer | failed(f"{log} as it is has no answer")
         elif answer["error"] is None and sealed is not None:
             answer = difference(answer, own[log], case.effects)
-            if UNREPEATED & set(case.effects):
+            if unrepeated(case.effects):
                 answer["oracle"] = None
         found.append(score(case, sealed, answer))
     return found

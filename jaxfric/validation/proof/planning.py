@@ -8,7 +8,7 @@ import numpy as np
 from numpy.random import Generator
 
 from ...terms.effects import effect
-from ..concealed import NAMES, OUTSIDE
+from ..concealed import OUTSIDE, names as drawn
 
 # What is concealed, in the order of the cases: of every 24, 8 machines are healthy, 12 have one
 # effect, 3 have two, and one has an effect that the library has no term for.
@@ -46,7 +46,7 @@ def plan(cases: int, seed: int, size: tuple[float, float]) -> list[Case]:
     rng = np.random.default_rng((seed, 0))
     rows = {
         "healthy": itertools.repeat(()),
-        "single": ((name,) for name in turns(NAMES, np.random.default_rng((seed, 1)))),
+        "single": ((name,) for name in turns(drawn(), np.random.default_rng((seed, 1)))),
         "pair": _pairs(np.random.default_rng((seed, 2))),
         "outside": ((name,) for name in turns(OUTSIDE, np.random.default_rng((seed, 3)))),
     }
@@ -66,7 +66,7 @@ def turns(names: tuple[str, ...], rng: Generator) -> Iterator[str]:
 
 def _pairs(rng: Generator) -> Iterator[tuple[str, str]]:
     """Two names at a time, the next in turn with the first of those after it that is unlike it."""
-    names = turns(NAMES, rng)
+    names = turns(drawn(), rng)
     waiting: list[str] = []
     while True:
         first = waiting.pop(0) if waiting else next(names)

@@ -21,26 +21,21 @@ from ...data.recording import Recording
 from ...explanation.question import from_position
 from ...identification.documents import to_json
 from ...identification.identifying import identify
-from ..concealed.kinds import KINDS, NAMES
+from ..concealed.kinds import kind, names
 from ..concealed.machines import Plan
 from ..concealed.nominal import Nominal
-from ..concealed.schedule import columns as timed
 from .planning import Case, turns
 from .running import LIMIT, claim, do_all
-from .trials import ANSWERS, SEALED, UNREPEATED, answered, failed, fingerprint, path, plain
+from .trials import ANSWERS, SEALED, answered, failed, fingerprint, path, plain
 
-# What is a force of the recorded position, velocity, acceleration and time alone. Asymmetry every
-# real machine has already, and another axis would have to be recorded.
-PLANTED = tuple(
-    name
-    for name in NAMES
-    if name in {
-        "stribeck", "viscous_nonlinearity", "gravity_unbalance", "cogging", "spring",
-        "hardening_spring", "end_stop", "position_dependent_friction", "sticky_spot",
-        "position_dependent_inertia", "thermal_drift", "friction_step", "load_drift",
-        "periodic_disturbance", "disturbance_pulses",
-    }
-)  # fmt: skip
+
+def planted() -> tuple[str, ...]:
+    """What is a force of the recorded position, velocity, acceleration and time alone.
+
+    Asymmetry every real machine has already, and another axis would have to be recorded.
+    """
+    return tuple(name for name in names() if kind(name).planted)
+
 
 # Draws of an effect's parameters until most of its force acts where the axis moves: at rest,
 # friction answers any force.
@@ -74,13 +69,13 @@ def plan(logs: Sequence[Log], sizes: Sequence[float], each: int, seed: int) -> l
     if each < 1 or not sizes or min(sizes) <= 0:
         raise ValueError(f"{each} cases of sizes {list(sizes)}; give at least one, and over zero.")
     found = [Case(f"{log.name}-own", "healthy", 0, (), (0.0, 0.0)) for log in logs]
-    names, numbers = turns(PLANTED, np.random.default_rng((seed, 4))), itertools.count(1)
+    effects, numbers = turns(planted(), np.random.default_rng((seed, 4))), itertools.count(1)
     for log, size, _ in itertools.product(logs, sizes, range(each)):
         number = next(numbers)
         machine = int(np.random.default_rng((seed, 5, number)).integers(2**31))
         # A baseline with a bump of its own takes up another one.
         bumped = not log.baseline.endswith("coulomb-viscous")
-        effect = next(name for name in names if not (bumped and name == "stribeck"))
+        effect = next(name for name in effects if not (bumped and kind(name).bump is False))
         case = Case(f"{log.name}-{number:03d}", "single", machine, (effect,), (size, size))
         found.append(case)
     return found
@@ -162,23 +157,21 @@ def plant(
     """
     motion = nominal(recording, *known)
     rng = np.random.default_rng((case.seed, zlib.crc32(name.encode())))
-    kind = KINDS[name]
+    own = kind(name)
     for _ in range(ATTEMPTS):
-        truth = kind.draw(rng, motion, case.size[0])
-        force = kind.force(truth, motion)
+        truth = own.draw(rng, motion, case.size[0])
+        force = own.force(truth, motion)
         power = float(np.sum(force**2))
         if power > 0 and np.sum(force[motion.way != 0] ** 2) > 0.5 * power:
             break
     else:
         raise ValueError(f"this recording leaves no room for {name}: give another seed or log.")
     # Rounded, since a tenth is to be counted among those of a tenth or more.
-    size, forces = round(kind.measure(truth, motion), 9), [force]
+    size, forces = round(own.measure(truth, motion), 9), [force]
     if holdout is not None:
         other = nominal(holdout, *known)
-        forces.append(
-            timed({name: truth}, other, 1).load if name in UNREPEATED else kind.force(truth, other)
-        )
-    return {**truth, "size": size, "where": kind.where(truth)}, forces
+        forces.append(own.over(truth, other, 1).load if own.unrepeated else own.force(truth, other))
+    return {**truth, "size": size, "where": own.where(truth)}, forces
 
 
 def nominal(recording: Recording, coulomb: float, mass: float) -> Nominal:

@@ -20,14 +20,13 @@ from ...explanation.verification import residual
 from ...identification.documents import to_json
 from ...models import named
 from ..concealed import Machine, Run, draw, record
+from ..concealed.kinds import unrepeated
 from .planning import Case
 
 SEALED, ANSWERS = "sealed", "answers"
 # Of an explanation, what is kept: not the model, nor what could not have been seen.
 KEPT = ("verdict", "where", "findings", "fit")
 REMEDY = "remove it, and what it stood for is done again."
-# Nobody can know the pushes of the held-out run from those of the other.
-UNREPEATED = frozenset({"disturbance_pulses"})
 
 
 def path(folder: Path, part: str, case: Case) -> Path:
@@ -123,7 +122,7 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
     and by the kernel and the alignment, that `explain` chooses for the recordings without the
     concealed force. `None` where no one could know the held-out force.
     """
-    if UNREPEATED & set(machine.effects):
+    if unrepeated(machine.effects):
         return None
     structure = named(machine.baseline)
     first, second = (

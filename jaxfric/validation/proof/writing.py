@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ..concealed import NAMES
+from ..concealed import names
 from . import counting as counted
 from .counting import Rate, middle, of_kind, rate
 from .planning import KINDS
@@ -12,8 +12,8 @@ from .scoring import LEAST_REDUCTION, Parameter, Score
 METHOD = f"""\
 A machine is drawn for each case: inertia, friction and its shape, asymmetry, units, loop, motion,
 sample rate, encoder, noise, an unrecorded load; of every 24 cases 8 are healthy, 12 have one
-concealed effect (the {len(NAMES)} names take turns), 3 have two, and one has an effect for which
-the library has no term. The truth is written to `sealed/` before `explain` starts. `explain` is
+concealed effect (all take turns), 3 have two, and one has an effect for which the library has no
+term. The truth is written to `sealed/` before `explain` starts. `explain` is
 given the recording, the name of the baseline that would be right for the healthy machine, and the
 held-out recording; a neighbouring axis' velocity is in the recording if, and only if, there is one
 that disturbs. Its answer is written to `answers/`. Scoring opens `sealed/` afterwards.
@@ -162,7 +162,7 @@ def rates(some: Sequence[Score]) -> list[str]:
 
 def _by_effect(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
     single = of_kind(scores, "single")
-    found = {name: [s for s in single if s.effects == (name,)] for name in NAMES}
+    found = {name: [s for s in single if s.effects == (name,)] for name in names()}
     return [(name, some) for name, some in found.items() if some]
 
 
