@@ -8,7 +8,9 @@ import pytest
 
 from jaxfric import PD, Recording, models
 from jaxfric.cli import main
+from jaxfric.cli.benefit import of_explanation
 from jaxfric.data import io
+from jaxfric.report import content
 from jaxfric.simulation.compensation import benefit
 
 TIME = jnp.asarray(np.arange(4001) / 1000)
@@ -75,3 +77,31 @@ def test_the_command_says_what_goes_and_what_is_assumed(tmp_path, capsys, monkey
     assert left == pytest.approx(found["compensated"]["error"], rel=1e-6)
     assert main(["simulate", model, log, "-o", out, "--json", document]) == 2
     assert "--compensate" in capsys.readouterr().err
+
+
+def test_export_says_what_feed_forward_would_be_worth(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("JAXFRIC_CACHE", "off")
+    model, log = str(tmp_path / "m.json"), str(tmp_path / "ref.csv")
+    (tmp_path / "m.json").write_text(json.dumps(machine().to_dict()))
+    io.write_table(log, {"time": TIME, "reference": GOAL})
+    line = ["export", model, "--to", "c", "-o", str(tmp_path / "axis.c"), "--reference", log]
+    assert main(line) == 0
+    said = capsys.readouterr().out
+    found = benefit(machine(), reference())
+    assert f"{found.without.error:.3g} m rms without" in said, said
+    assert f"{found.error_removed:.0%} removed" in said
+    assert "with pd:kp=50000,kd=1000" in said and "the most that can be had" in said
+
+
+def test_an_explanation_compares_feed_forward_by_both_models():
+    lacking = machine(**{"coulomb+": 12.0, "coulomb-": 12.0})
+    log = Recording(time=TIME, force=0 * TIME, position=GOAL, channels={"reference": GOAL})
+    found = of_explanation(lacking, machine(), log)
+    without, by_both = found["improved"]["without"], found["improved"]["compensated"]
+    assert without["error"] > found["baseline"]["compensated"]["error"] > by_both["error"]
+    document = {"benefit": found}
+    rows = content.benefit(document, {"force": "N", "position": "m"})
+    assert [name for name, *_ in rows][1:] == ["by the baseline", "by the improved model"]
+    assert rows[0][1] == f"{without['error']:.3g} m"
+    assert of_explanation(lacking, machine(), reference()) is None  # no set-point is known
+    assert content.benefit({}, {}) == []

@@ -273,9 +273,7 @@ def _add_predict(commands) -> None:
 
 
 def _add_simulate(commands) -> None:
-    command = _add(
-        commands, "simulate", "commands.simulate", "run a model forward, with stick and slip"
-    )
+    command = _add(commands, "simulate", "simulate.run", "run a model forward, with stick and slip")
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="REFERENCE.csv", help="set-point, or force, over time")
     command.add_argument("-o", "--out", type=options.table, required=True, metavar="OUT.csv")
@@ -326,6 +324,13 @@ def _add_export(commands) -> None:
         metavar="LOW:HIGH",
         help="likewise (default: a period of every wave)",
     )
+    command.add_argument(
+        "--reference",
+        metavar="FILE",
+        help="a set-point over time (column reference or position): say how much tracking error "
+        "and controller force feed-forward by the model would remove along it",
+    )
+    options.reading(command)
 
 
 def _add_models(commands) -> None:

@@ -1,4 +1,4 @@
-"""The commands but the demo: identify, predict, simulate, models."""
+"""The commands but the demo: identify, select, predict, models."""
 
 import dataclasses
 import os
@@ -272,79 +272,6 @@ def _unknown(model: Model, blank: np.ndarray, moving: np.ndarray, arguments) -> 
         f"{np.count_nonzero(blank)} samples at rest have no force, as {arguments.model} has no "
         f"value for {', '.join(lacking)}."
     ]
-
-
-def simulate(arguments: Namespace) -> int:
-    """`jaxfric simulate`: motion and force of a model, as a table."""
-    from ..simulation import control
-    from ..simulation.simulating import simulate as simulate_model
-
-    model = _load(arguments.model)
-    controller = None
-    if arguments.controller:
-        kinds = {"pd": control.PD, "pid": control.PID, "cascade": control.Cascade}
-        kind, gains = arguments.controller
-        controller = kinds[kind](**gains)
-    reference, notes = read(arguments.file, arguments, set_point=True)
-    reference = _in_units(reference, model, arguments)
-    if arguments.compensate is not None:
-        return _compensated(model, reference, controller, notes, arguments)
-    if arguments.json:
-        raise ValueError("--json holds the benefit of --compensate, which is not given.")
-    if controller is None and not np.any(np.asarray(reference.force)):
-        raise ValueError(
-            f"{arguments.file}: no force drives the axis. Name the column (--columns force=NAME) "
-            "or follow a set-point (--controller pd:kp=…,kd=…)."
-        )
-    try:
-        run = simulate_model(model, reference, controller)
-    except ValueError as error:
-        raise ValueError(f"{arguments.model}, {arguments.file}: {error}") from error
-    if not np.all(np.isfinite(np.asarray(run.position))):
-        raise ValueError(
-            f"{arguments.file}: the simulated motion grows without bound. Check the gains and "
-            "the sample rate (a gain must act slower than the clock) and the model's units."
-        )
-    columns = {"time": run.time, "force": run.force, "position": run.position}
-    if run.velocity is not None:
-        columns["velocity"] = run.velocity
-    put_table(arguments.out, columns | run.channels, notes, f"{run.num_samples} samples")
-    return 0
-
-
-def _compensated(model: Model, reference: Recording, controller, notes, arguments) -> int:
-    """The benefit of feed-forward: said, as JSON, and the run with it as a table."""
-    from ..simulation.compensation import ASSUMED, benefit, usual
-
-    drive = _load(arguments.compensate) if arguments.compensate else model
-    try:
-        if controller is None:
-            controller = usual(model, reference)
-            gains = f"pd:kp={float(controller.kp):g},kd={float(controller.kd):g}"
-            notes = [*notes, f"No controller is given; taken is {gains} (--controller)."]
-        found = benefit(model, reference, controller, drive)
-    except ValueError as error:
-        raise ValueError(f"{arguments.model}, {arguments.file}: {error}") from error
-    figures = [*found.without, *found.compensated]
-    if not np.all(np.isfinite(figures)):
-        raise ValueError(f"{arguments.file}: the simulated motion grows without bound.")
-    units = dict(model.units)
-    by = arguments.compensate or "the model itself, the most that can be had"
-    columns = {"time": found.run.time, "force": found.run.force, "position": found.run.position}
-    if arguments.json:
-        both = {"without": found.without._asdict(), "compensated": found.compensated._asdict()}
-        parts = {"error_removed": found.error_removed, "force_removed": found.force_removed}
-        document = {"schema": "jaxfric.benefit/1", "units": units, "assumed": ASSUMED}
-        put(arguments.json, documents.to_json(document | both | parts))
-    summary = (
-        f"{found.run.num_samples} samples with compensation by {by}\n"
-        f"tracking error {found.without.error:.3g} {units['position']} rms without, "
-        f"{found.compensated.error:.3g} with compensation: {found.error_removed:.0%} removed\n"
-        f"controller force {found.without.force:.3g} {units['force']} rms without, "
-        f"{found.compensated.force:.3g} with: {found.force_removed:.0%} removed\n{ASSUMED}"
-    )
-    put_table(arguments.out, columns | found.run.channels, notes, summary)
-    return 0
 
 
 def _load(path: str) -> Model:

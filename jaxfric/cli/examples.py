@@ -24,6 +24,7 @@ _LINES = {
     "export": [
         "jaxfric export model.json --to c -o axis.c",
         "jaxfric export model.json --to st --name x_axis -o x_axis.st",
+        "jaxfric export model.json --to st -o axis.st --reference cycle.csv  # what it is worth",
         "jaxfric export model.json --to fmu -o axis.fmu",
         "jaxfric export model.json --to mujoco --speed 0:0.2",
     ],

@@ -13,7 +13,7 @@ from ..models import Model, load, named
 from ..report import page
 from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
-from . import robot
+from . import benefit, robot
 from .commands import put, read, today, working
 from .options import say, standard
 
@@ -49,6 +49,9 @@ def run(arguments: Namespace) -> int:
     for path in (arguments.baseline, arguments.simulation):
         if path and (digest := sha256(path)):
             document["baseline"] |= {"file": path, "sha256": digest}
+    if arguments.report or arguments.simulate:
+        worth = benefit.of_explanation(found.baseline, found.model, recording)
+        document |= {"benefit": worth} if worth else {}
     texts = written(found, document, arguments, (recording, holdout))
     # First what lasts: who reads the table may close the pipe.
     for path, text in texts.items():

@@ -8,13 +8,21 @@ from ..data.io import write_bytes
 from ..export import Exported, export
 from ..models import Model
 from ..units import VELOCITY, spell
-from .commands import _load, put
+from .commands import _in_units, _load, put, read
 from .options import say, standard
 
 
 def run(arguments: Namespace) -> int:
     """Write the model's text, and say what its form costs."""
     model = _load(arguments.model)
+    worth = ""
+    if arguments.reference:
+        from . import benefit
+
+        reference = _in_units(
+            read(arguments.reference, arguments, set_point=True)[0], model, arguments
+        )
+        worth = "\n" + benefit.exported(model, reference, arguments)
     try:
         found = export(
             model,
@@ -33,7 +41,10 @@ def run(arguments: Namespace) -> int:
     else:
         raise ValueError(f"{arguments.to} is an archive: give it a file, -o {arguments.name}.fmu.")
     head = "" if alone else f"{arguments.out}: "
-    say(f"{head}{summary(found, model, arguments.to)}", file=sys.stderr if alone else sys.stdout)
+    say(
+        f"{head}{summary(found, model, arguments.to)}{worth}",
+        file=sys.stderr if alone else sys.stdout,
+    )
     return 0
 
 

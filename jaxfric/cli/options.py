@@ -19,7 +19,7 @@ PICTURES = ("png", "pdf", "svg")
 # What the options of every command read, and what they write.
 READ = (
     "file", "files", "model", "compensate", "baseline", "simulation", "simulation_holdout",
-    "holdout", "mujoco",
+    "holdout", "mujoco", "reference",
 )  # fmt: skip
 WRITTEN = ("out", "json", "save", "report", "plot")
 

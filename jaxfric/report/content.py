@@ -56,6 +56,25 @@ def definitions(fit: Mapping[str, Any]) -> str:
     return text
 
 
+def benefit(document: Mapping[str, Any], units: Mapping[str, str]) -> list[tuple[str, ...]]:
+    """Tracking error and controller force in closed loop, without and with feed-forward."""
+    found = document.get("benefit")
+    if not found:
+        return []
+    runs = [("no feed-forward", found["improved"]["without"])]
+    known = (("baseline", "by the baseline"), ("improved", "by the improved model"))
+    runs += [(text, found[name]["compensated"]) for name, text in known if name in found]
+    return [
+        (
+            name,
+            f"{run['error']:.3g} {units['position']}",
+            f"{run['largest_error']:.3g} {units['position']}",
+            f"{run['force']:.3g} {units['force']}",
+        )
+        for name, run in runs
+    ]
+
+
 def cards(document, curves, units, terms) -> list[dict[str, Any]]:
     """Each finding with its picture, its formula in numbers, parameters and facts."""
     findings = document.get("findings") or ()
