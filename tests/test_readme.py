@@ -10,6 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 METHOD = "jaxfric/explanation/METHOD.md"
+PROOF = "benchmarks/PROOF.md"
 PAGES = ["README.md", "CONTRIBUTING.md"]
 
 
@@ -30,7 +31,7 @@ def test_python_blocks_run_one_after_the_other(page, capsys):
 
 
 def test_links_lead_to_files():
-    for page in [*PAGES, METHOD]:
+    for page in [*PAGES, METHOD, PROOF]:
         path = ROOT / page
         for link in re.findall(r"\]\((?!https?:|#)([^)#]+)", path.read_text("utf-8")):
             assert (path.parent / link).exists(), f"{page} links to {link}, which is not there"

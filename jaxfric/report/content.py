@@ -56,6 +56,17 @@ def definitions(fit: Mapping[str, Any]) -> str:
     return text
 
 
+def averaged(fit: Mapping[str, Any]) -> str:
+    """That the pictures over a coordinate show filtered forces."""
+    width = (fit.get("filtered_force_error") or {}).get("width")
+    if not width:
+        return ""
+    return (
+        f"Forces are averaged over {2e3 * width:.2g} ms here, as in the search for effects: "
+        "what changes quicker looks smaller than its amplitude in the text."
+    )
+
+
 def benefit(document: Mapping[str, Any], units: Mapping[str, str]) -> list[tuple[str, ...]]:
     """Tracking error and controller force in closed loop, without and with feed-forward."""
     found = document.get("benefit")

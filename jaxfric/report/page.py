@@ -109,6 +109,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "parameters": content.parameters(document),
         "units": units,
         "code": handover.code(model) if model else [],
+        "averaged": content.averaged(document.get("fit") or {}),
         "benefit": content.benefit(document, units),
         "assumed": (document.get("benefit") or {}).get("assumed", ""),
         "controller": (document.get("benefit") or {}).get("controller", ""),
