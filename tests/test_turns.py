@@ -7,7 +7,7 @@ import pytest
 
 from jaxfric import read
 from jaxfric.cli import main
-from jaxfric.explanation.quantities import turns
+from jaxfric.explanation.quantities import per_pole_pair, turns
 from jaxfric.identification.identified import Estimate
 
 TIME = np.arange(2001) / 1000
@@ -77,3 +77,15 @@ def test_a_period_of_counts_is_told_per_revolution():
     period = 8192 / 7 / COUNTS
     assert turns(Estimate(period, period * 1e-4, "rad")) == " (7 times per revolution)"
     assert turns(Estimate(1 / 7, 1e-5, "rev")) == " (7 times per revolution)"
+
+
+def test_periods_are_told_per_pole_pair():
+    def told(period, error=0.0, unit="rev", pairs=7):
+        return per_pole_pair(Estimate(period, error, unit), pairs)
+
+    assert told(1 / 42) == " That is 6 times per pole pair."
+    assert told(360 / 7.001, 0.1, "deg") == " That is once per pole pair."
+    assert told(1 / 5, 1e-5) == (
+        " That is 0.714 times per pole pair, so not of the electrical period."
+    )
+    assert told(0.0025, unit="m") == "" and told(2.0) == "" and told(float("nan")) == ""

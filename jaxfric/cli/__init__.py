@@ -244,6 +244,12 @@ def _add_explain(commands) -> None:
         help="keep a saved model's parameters, unless they are found wrong, instead of refitting",
     )
     command.add_argument(
+        "--pole-pairs",
+        type=options.count,
+        metavar="N",
+        help="of the motor whose angle the position is: periods are told per pole pair too",
+    )
+    command.add_argument(
         "--simulate", action="store_true", help="run the models forward too, before and after"
     )
     command.add_argument(

@@ -90,16 +90,16 @@ def selection(arguments: Namespace) -> int:
     done, failures = [], 0
     for path in arguments.files:
         try:
-            recording, _ = read(path, arguments)
+            recording, notes = read(path, arguments)
             found = select(recording, path)
         except (ValueError, OSError) as error:
             say(f"jaxfric select: {message(error)}", file=sys.stderr)
             failures += 1
             continue
-        done.append({"file": path} | found.to_dict())
+        done.append({"file": path, "notes": notes} | found.to_dict())
         if not _printed(arguments):
             say(
-                text([[f"{path}:"], *tabulate.standings(done[-1])])
+                text([[f"{path}:", *notes], *tabulate.standings(done[-1])])
                 + "\n" * (len(arguments.files) > 1)
             )
     if arguments.json and done:

@@ -8,11 +8,14 @@ from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
 from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
+from ..explanation.quantities import per_pole_pair
 from ..identification import documents, tabulate
+from ..identification.uncertainty import Estimate
 from ..models import Model, load, named
 from ..report import page
 from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
+from ..terms.effects import EFFECTS
 from . import benefit, robot
 from .commands import put, read, today, working
 from .options import say, standard
@@ -46,6 +49,8 @@ def run(arguments: Namespace) -> int:
         raise ValueError(f"{arguments.file}: {error}") from error
     document = found.to_dict()
     document["recording"]["notes"] = notes
+    if arguments.pole_pairs:
+        _per_pole_pair(found, document, arguments.pole_pairs)
     for path in (arguments.baseline, arguments.simulation):
         if path and (digest := sha256(path)):
             document["baseline"] |= {"file": path, "sha256": digest}
@@ -59,6 +64,15 @@ def run(arguments: Namespace) -> int:
     if not any(standard(path) for path in texts):
         say(tabulate.explanation(document))
     return 0
+
+
+def _per_pole_pair(found: Explanation, document: dict, pairs: int) -> None:
+    """Add to the sentences how often a period goes into a pole pair of the motor."""
+    for finding, entry in zip(found.findings, document["findings"], strict=True):
+        known = EFFECTS.get(finding.effect)
+        for name in known.periods if known else ():
+            if isinstance(period := finding.parameters.get(name), Estimate):
+                entry["sentence"] += per_pole_pair(period, pairs)
 
 
 def written(

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..models import Model
+from ..terms import KNOWN_FORCE
 from .bins import Axis, Bins, axis
 from .evidence import Evidence
 from .locate import Place
@@ -113,4 +114,6 @@ def _friction(models: tuple[Model, Model], evidence: Evidence, after: Fit) -> di
         "at": at,
         "measured": measured,
         "error": error,
+        # Of a simulator's force the models hold what is added to it, and that is no friction curve.
+        "corrects": KNOWN_FORCE in models[0].term.coordinates,
     }

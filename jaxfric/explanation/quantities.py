@@ -52,6 +52,19 @@ def nil(estimate: Estimate) -> bool:
     return 0 < half < math.inf and value <= 1.05 * half
 
 
+def per_pole_pair(period: Estimate, pairs: int) -> str:
+    """How often a period of an angle goes into a pole pair: " That is 6 times per pole pair."."""
+    turn = TURNS.get(period.unit)
+    value, error = float(period.value), float(period.standard_error)
+    if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
+        return ""
+    count, half = turn / value / pairs, 2 * turn * error / value**2 / pairs
+    whole = round(count)
+    if whole and abs(count - whole) <= max(half, 0.01 * whole):
+        return f" That is {'once' if whole == 1 else f'{whole} times'} per pole pair."
+    return f" That is {count:.3g} times per pole pair, so not of the electrical period."
+
+
 def turns(period: Estimate) -> str:
     """How often a period of an angle goes into a revolution: " (5 times per revolution)"."""
     turn = TURNS.get(period.unit)

@@ -247,7 +247,8 @@ def curves(axes, friction: Mapping[str, Any], force: str, speed: str) -> None:
     axes.axvline(0, color="0.8", lw=0.8, zorder=0)
     axes.set_xlabel(f"velocity [{plain(speed)}]")
     axes.locator_params(axis="x", nbins=6)
-    axes.set_ylabel(f"friction force [{plain(force)}]")
+    what = "correction" if friction.get("corrects") else "friction force"
+    axes.set_ylabel(f"{what} [{plain(force)}]")
     axes.grid(color="0.93")
     axes.legend(fontsize=8, loc="upper left")
 

@@ -154,9 +154,9 @@ def friction(curves: Curves, force: str, position: str) -> Chart:
     names = ("measured", "error")
     measured, error = (spread(curves.get(name), modelled, 0) for name in names)
     picture = chart(
-        "Friction over velocity",
+        "Correction over velocity" if curves.get("corrects") else "Friction over velocity",
         ("velocity", f"{position}/s"),
-        ("friction force", force),
+        ("correction" if curves.get("corrects") else "friction force", force),
         [at[i] for i in order],
         [
             points("measured", "measured less all else, ± 95 %", measured, error),
