@@ -1,17 +1,15 @@
 """Section IV of Kim, Kim & Ha (2004) on our own machine: table, curves, and problem (P).
 
-    python benchmarks/paper_table.py [FOLDER FOR THE FIGURES]
+    python benchmarks/paper_table.py
 
 Prints the parameters (true, ACVM, AGM, ALM) of one noise-free period, then the error of the
 friction curve of (L) and (P) over noise, encoder and record (minutes: many
-compilations). Figures need matplotlib.
+compilations). The figures: `paper_figures.py`.
 """
 
 import argparse
-import pathlib
 
 import jax
-import jax.numpy as jnp
 from problem_p import curve_distance, curve_error, problem_p
 
 from jaxfric.identification.identifying import identify
@@ -63,44 +61,12 @@ def comparison():
                 print(f"{name:<34}{mine:>10.4f}{cells}{rows[0]['inertia']:>14.3f}")
 
 
-def figures(fits, recording, folder):
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    folder.mkdir(parents=True, exist_ok=True)
-    figure, axes = plt.subplots(3, 1, sharex=True, figsize=(7, 7))
-    signals = {"position, m": recording.position, "velocity, m/s": recording.velocity}
-    for axis, (name, signal) in zip(
-        axes, (signals | {"force, N": recording.force}).items(), strict=True
-    ):
-        axis.plot(recording.time, signal)
-        axis.set_ylabel(name)
-    axes[-1].set_xlabel("time, s")
-    figure.savefig(folder / "paper_record.png", dpi=150)
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.5))
-    for axis, speed in zip(axes, (0.19, 0.03), strict=True):
-        v = jnp.linspace(-speed, speed, 2000)
-        axis.plot(v, scenario.machine().friction(v), "k", lw=3, alpha=0.4, label="true")
-        for name, fit in fits.items():
-            axis.plot(v, fit.model.friction(v), lw=1, label=name)
-        axis.set_xlabel("velocity, m/s")
-        axis.set_ylabel("friction, N")
-        axis.legend()
-    figure.savefig(folder / "paper_friction.png", dpi=150)
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=pathlib.Path, help="where the figures go")
-    folder = parser.parse_args().folder
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     jax.config.update("jax_enable_x64", True)
     recording = scenario.record(scenario.machine())
     fits = {short: identify(name, recording) for short, name in MODELS.items()}
     parameter_table(fits)
-    if folder is not None:
-        figures(fits, recording, folder)
     comparison()
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import jaxfric as jf
+from jaxfric.cli import main
 from jaxfric.models import Model
 
 STEP = 1e-3
@@ -119,6 +120,7 @@ def test_a_simulated_lugre_machine_is_identified_within_its_intervals(bristled):
         truth = float(axis.parameters[name])
         assert abs(float(test.model.parameters[name]) - truth) < 0.05 * truth
         assert abs(float(found.model.parameters["stribeck_force-"]) - 10.0) > 5.0
+    assert test.kind == "lugre" and {each.name for each in test.kinds} == {"jump", "dahl", "lugre"}
     after = jf.predict(test.model, log) - log.force
     before = jf.predict(found.model, log) - log.force
     assert float(jnp.std(after)) < 0.5 * float(jnp.std(before))
@@ -133,6 +135,25 @@ def test_without_bristles_none_are_found():
     test = jf.presliding(log, jf.identify("lorentzian", log))
     # None, or a distance below what the encoder counts.
     assert test.stiffness is None and test.why or test.distance < 2e-6
+    assert test.kind == "jump"
+
+
+@pytest.mark.slow
+def test_the_command_says_what_it_found_and_saves_it(bristled, tmp_path, capsys):
+    _, log, _ = bristled
+    file, saved, out = (tmp_path / name for name in ("axis.csv", "model.json", "found.json"))
+    columns = np.stack([log.time, log.position, log.force], axis=1)
+    np.savetxt(file, columns, delimiter=",", header="time,position,force", comments="")
+    command = ["presliding", str(file), "--model", "lorentzian", "--save", str(saved)]
+    assert main([*command, "--json", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "* LuGre" in said and "Presliding: stiffness" in said.replace("\n", " ")
+    document = json.loads(out.read_text())
+    assert document["kind"] == "lugre"
+    assert document["force_error"]["bristles"] < document["force_error"]["jumping"]
+    assert Model.from_dict(json.loads(saved.read_text())).bristles is not None
+    assert main(["presliding", str(file), "--model", "gausian"]) == 2
+    assert "gaussian" in capsys.readouterr().err
 
 
 def test_bristles_are_saved_and_said_at_export():

@@ -143,6 +143,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_design,
         _add_select,
         _add_watch,
+        _add_presliding,
     ):
         add(commands)
     return parser
@@ -395,3 +396,24 @@ def _add_watch(commands) -> None:
     command.add_argument("file", metavar="FILE", help="a CSV that grows, or - for standard input")
     options.watching(command)
     options.following(command)
+
+
+def _add_presliding(commands) -> None:
+    command = _add(
+        commands, "presliding", "presliding.run", "bristles (Dahl, LuGre) in place of a jump"
+    )
+    command.add_argument("file", metavar="FILE", help="a recording with a position")
+    command.add_argument(
+        "--model",
+        default="coulomb-viscous",
+        metavar="NAME_OR_FILE",
+        help="the friction that they bend, and all else: a name that jaxfric models lists, or a "
+        "saved model, whose parameters are refitted (default: coulomb-viscous)",
+    )
+    command.add_argument(
+        "--json", type=options.output, metavar="OUT", help="write what was found; - prints it"
+    )
+    command.add_argument(
+        "--save", type=options.output, metavar="MODEL.json", help="write the model with bristles"
+    )
+    options.reading(command)

@@ -29,6 +29,10 @@ _LINES = {
         "jaxfric export model.json --to mujoco --speed 0:0.2",
     ],
     "models": ["jaxfric models"],
+    "presliding": [
+        "jaxfric presliding axis.csv --model lorentzian --save bristles.json",
+        "jaxfric presliding axis.csv --model better.json   # with all that explain had found",
+    ],
     "effects": [
         "jaxfric effects",
         "jaxfric effects cogging",

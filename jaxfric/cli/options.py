@@ -21,7 +21,7 @@ READ = (
     "file", "files", "model", "compensate", "baseline", "simulation", "simulation_holdout",
     "holdout", "mujoco", "reference",
 )  # fmt: skip
-WRITTEN = ("out", "json", "save", "report", "plot")
+WRITTEN = ("out", "json", "save", "report", "plot", "c")
 
 
 def say(text: str, end: str = "\n", file: TextIO | None = None) -> None:
@@ -306,6 +306,12 @@ def watching(command: ArgumentParser) -> None:
         default=1e-4,
         metavar="RATE",
         help="of the change detection, a stroke of a direction (default: 0.0001)",
+    )
+    command.add_argument(
+        "--c",
+        type=output,
+        metavar="OUT.c",
+        help="instead: write the update as C99 for a drive, for the speeds of the stream's start",
     )
     command.add_argument("--once", action="store_true", help="stop at the end of the file")
     command.add_argument(

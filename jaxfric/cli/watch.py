@@ -9,7 +9,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..online import Change, Follower, feed
+from ..data.io import write_text
+from ..online import Change, Follower, c_source, feed
 from ..units import spell
 from .options import say
 
@@ -26,6 +27,8 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
     stream = feed.Feed(lines, arguments.columns, arguments.scale, arguments.units, source)
     samples = iter(stream)
     start = feed.begin(samples, stream.has_velocity, source)
+    if arguments.c:
+        return _generated(start, source, arguments)
     follower = Follower(
         arguments.model,
         slowest=start.slowest,
@@ -51,6 +54,22 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
             told.parameters(sample.time)
             following = sample.time + arguments.every
     told.parameters(last)
+    return 0
+
+
+def _generated(start: feed.Start, source: str, arguments: Namespace) -> int:
+    """The update for the speeds of the stream's beginning, as C."""
+    if arguments.model != "coulomb-viscous" or arguments.window:
+        raise ValueError(
+            "--c writes Coulomb and viscous friction that fades (--keep): leave out --model and "
+            "--window."
+        )
+    options = {"keep": arguments.keep, "false_alarms": arguments.false_alarms}
+    write_text(arguments.c, c_source(start.slowest, start.fastest, **options))
+    say(
+        f"{arguments.c}: C99 for slip from {start.slowest:.3g} on and speeds up to "
+        f"{start.fastest:.3g}, as {source} has them."
+    )
     return 0
 
 

@@ -10,32 +10,45 @@ derivatives stand on the kernel of the weak form, over reversals too: none is ta
 import dataclasses
 from typing import Any, NamedTuple
 
-import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
 from .. import signals
 from ..data.recording import Recording, require
+from ..looks.text import Block, Table
 from ..models import Model
 from ..terms import bristles
 from ..units import DAMPING, STIFFNESS, spell
+from .bristle_fit import HALF_WIDTH, Rows, linear, refined, rows_of, scan, starts, through
+from .deciding import STRONG, independent
 from .uncertainty import Estimate, deviations, places
 
-# The kernel is as short as its second differences allow: reversals are over in a few samples.
-HALF_WIDTH = 8
 # Eight places a decade of stiffness, between which the cost is smooth.
 PER_DECADE = 8
 # Nearer to steady slip than a hundredth of the friction a row tells of the slip curve, not of z.
 STEADY = 0.01
 FEWEST = 96
-ITERATIONS = 60
-# Parts of the top speed at which a Stribeck curve may bend; the refinement reaches between them.
-BUMPS = (0.01, 0.05, 0.2)
 # A stiffness is seen if it is told to within a factor of three, its 95 % interval each way.
 TOLD = np.log(3.0) / 2
+# The kinds of friction at rest, by rising number of parameters.
+KINDS = {"jump": 0, "dahl": 1, "lugre": 2}
+NAMES = {"jump": "jumps", "dahl": "Dahl", "lugre": "LuGre"}
+SAID = {
+    "jump": "friction that jumps at rest describes the recording as well: no presliding shows",
+    "dahl": "Dahl: friction that bends at rest describes the recording better, without a damping",
+    "lugre": "LuGre: friction that bends at rest, with a damping, describes the recording better",
+}
+
+
+class Kind(NamedTuple):
+    """A kind of friction at rest: what it leaves of the rows, norm(u − û)/norm(u), and by how much
+    its information criterion is `above` the least.
+    """
+
+    name: str
+    filtered_force_error: float
+    above: float
 
 
 class Presliding(NamedTuple):
@@ -43,7 +56,8 @@ class Presliding(NamedTuple):
 
     `distance`: friction at rest over σ₀, m, the scale of presliding. `seconds`: of presliding.
     `model`: with them and the static parameters refined beside them, for `predict` and `simulate`;
-    `standard_errors` of the static parameters by name.
+    `standard_errors` of the static parameters by name. `kinds`: friction that jumps at rest, Dahl's
+    (σ₁ = 0) and LuGre's, each with its static parameters refined on the same rows.
     """
 
     stiffness: Estimate | None
@@ -53,11 +67,17 @@ class Presliding(NamedTuple):
     why: str = ""
     model: Model | None = None
     standard_errors: dict[str, float] = {}
+    kinds: tuple[Kind, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """The simplest kind that is not told from the best; `jump` where nothing was compared."""
+        return _simplest(self.kinds)
 
     def to_dict(self) -> dict[str, Any]:
         """The bristles as plain data, in the units of the recording."""
         values = {"stiffness": self.stiffness, "damping": self.damping}
-        told = {
+        told: dict[str, Any] = {
             name: None
             if each is None
             else {
@@ -67,7 +87,9 @@ class Presliding(NamedTuple):
             }
             for name, each in values.items()
         }
-        return told | {"distance": self.distance, "seconds": self.seconds, "why": self.why}
+        kinds = [each._asdict() for each in self.kinds]
+        told |= {"distance": self.distance, "seconds": self.seconds, "why": self.why}
+        return told | {"kinds": kinds, "kind": self.kind}
 
     def __repr__(self) -> str:
         if self.stiffness is None:
@@ -81,14 +103,6 @@ class Presliding(NamedTuple):
         return "\n".join(
             [f"bristles over {self.seconds:.3g} s of presliding", *said, self.why]
         ).strip()
-
-
-class _Rows(NamedTuple):
-    """What does not depend on the bristles: the recording, the kernel and its places."""
-
-    recording: Recording
-    kernel: Float[Array, " K"]
-    centre: Float[Array, " J"]
 
 
 def presliding(recording: Recording, found: Any) -> Presliding:
@@ -113,7 +127,7 @@ def presliding(recording: Recording, found: Any) -> Presliding:
             "known. Move in both directions, and identify a model with Inertia()."
         )
     log = signals.prepare(recording)
-    rows = _rows(log)
+    rows = rows_of(log)
     ends = jnp.asarray([-1e-9, 1e-9]) * signals.scales(log).fastest
     level = float(jnp.mean(jnp.abs(bristles.dry(found.model.term, found.model.alpha, ends))))
     if not level > 0 or rows.centre.size < FEWEST:
@@ -121,69 +135,7 @@ def presliding(recording: Recording, found: Any) -> Presliding:
     return _fitted(found, rows, level)
 
 
-def _rows(log: Recording) -> _Rows:
-    """The kernel (1 − τ²)⁴ with both derivatives by differences, and where it is whole."""
-    place = np.arange(-HALF_WIDTH, HALF_WIDTH + 1) / (HALF_WIDTH + 1)
-    kernel = (1 - place**2) ** 4
-    linked = signals.host_continuous(log, signals.host_interval(log))
-    sound = np.asarray(log.mask) & np.isfinite(np.asarray(log.position) + np.asarray(log.force))
-    broken = np.concatenate([[0], np.cumsum(~(linked & sound[1:] & sound[:-1]))])
-    reach = HALF_WIDTH + 1
-    count = broken.size
-    centre = np.arange(reach, count - reach, HALF_WIDTH // 2)
-    whole = broken[centre + reach] == broken[centre - reach]
-    return _Rows(log, jnp.asarray(kernel / kernel.sum()), jnp.asarray(centre[whole]))
-
-
-def _through(rows: _Rows, signal: Float[Array, " N"], order: int = 0) -> Float[Array, " J"]:
-    """A signal through the kernel, or through a difference of the kernel of that order."""
-    kernel, step = rows.kernel, signals.interval(rows.recording)
-    if order == 1:
-        kernel = -0.5 * jnp.convolve(kernel, jnp.array([1.0, 0.0, -1.0])) / step
-    if order == 2:
-        kernel = jnp.convolve(kernel, jnp.array([1.0, -2.0, 1.0])) / step**2
-    reach = kernel.size // 2
-    index = rows.centre[:, None] + jnp.arange(-reach, reach + 1)[None]
-    return signal[index] @ kernel
-
-
-def _left(
-    model: Model, static: Float[Array, " P"], dynamic: Float[Array, " 2"], rows: _Rows
-) -> tuple[Float[Array, " J"], Float[Array, " J"], Float[Array, " J"]]:
-    """Force left by the bristles with σ₀ = exp(dynamic₀), σ₁; the column of σ₁; distance from slip.
-
-    `static`: the affine and the nonlinear parameters of the model.
-    """
-    count, log = model.alpha.size, rows.recording
-    alpha, term = static[:count], model.term.with_beta(static[count:])
-    stiffness = jnp.exp(dynamic[0])
-    own = bristles.dry(term, alpha, log.velocity)
-    # F = σ₀ z − dry is what `force` gives without damping, from which z is read off again.
-    bent = bristles.force(term, alpha, stiffness, jnp.zeros(()), log)
-    z = (bent + own) / stiffness
-    inertia = dict(zip([p.name for p in term.affine], alpha, strict=True))["inertia"]
-    rest = term.columns(log) @ alpha + term.offset(log)
-    pushed = _through(rows, log.force - rest - bent)
-    turning = _through(rows, z, 1)
-    left = pushed - inertia * _through(rows, log.position, 2) - dynamic[1] * turning
-    away = _through(rows, jnp.abs(bent) / jnp.maximum(jnp.max(jnp.abs(own)), 1e-300))
-    return left, turning, away
-
-
-@eqx.filter_jit
-def _scan(model, static, rows, grid):
-    """Cost over the grid of log σ₀, each with its best σ₁ ≥ 0, `(G,)` each."""
-
-    def one(place):
-        left, turning, _ = _left(model, static, jnp.stack([place, jnp.zeros(())]), rows)
-        power = jnp.sum(turning**2)
-        damping = jnp.maximum(jnp.sum(left * turning) / jnp.where(power > 0, power, 1.0), 0.0)
-        return jnp.sum((left - damping * turning) ** 2), damping
-
-    return jax.lax.map(one, grid)
-
-
-def _fitted(found: Any, rows: _Rows, level: float) -> Presliding:
+def _fitted(found: Any, rows: Rows, level: float) -> Presliding:
     model: Model = found.model
     static = jnp.concatenate([model.alpha, model.term.beta()])
     limits = signals.scales(rows.recording)
@@ -191,94 +143,56 @@ def _fitted(found: Any, rows: _Rows, level: float) -> Presliding:
     shortest = float(limits.slowest * limits.interval)
     longest = 0.1 * float(limits.high - limits.low)
     ends = np.log(level / np.array([longest, shortest]))
-    grid = np.linspace(
-        ends[0], ends[1], max(int(PER_DECADE * (ends[1] - ends[0]) / np.log(10)), 4) + 1
-    )
-    best = None
-    for start in _starts(model, static, limits):
-        costs, dampings = map(np.asarray, _scan(model, start, rows, jnp.asarray(grid)))
-        place = int(np.nanargmin(costs))
-        first = jnp.concatenate([jnp.asarray([grid[place], dampings[place]]), start])
-        values, cost = _refined(model, first, rows)
-        if best is None or float(cost) < best[1]:
-            best = np.asarray(values), float(cost)
-    assert best is not None
-    values = best[0]
+    count = max(int(PER_DECADE * (ends[1] - ends[0]) / np.log(10)), 4) + 1
+    grid = jnp.asarray(np.linspace(ends[0], ends[1], count))
+    best: dict[str, tuple[np.ndarray, float]] = {}
+    for start in starts(model, static, limits):
+        for name, first, free in _firsts(model, start, rows, grid):
+            values, cost = refined(model, jnp.concatenate([first, start]), rows, free)
+            if name not in best or float(cost) < best[name][1]:
+                best[name] = np.asarray(values), float(cost)
+    kinds = _compared(model, rows, {name: values for name, (values, _) in best.items()})
+    values = best["dahl" if _simplest(kinds) == "dahl" else "lugre"][0]
     if not ends[0] < values[0] < ends[1]:
         which = "longer than a tenth of the stroke" if values[0] < ends[0] else "over in a sample"
-        return Presliding(None, None, np.nan, 0.0, f"presliding is {which}, if there is any")
-    return _told(found, rows, values)
+        why = f"presliding is {which}, if there is any"
+        return Presliding(None, None, np.nan, 0.0, why, kinds=kinds)
+    return _told(found, rows, values)._replace(kinds=kinds)
 
 
-def _starts(model: Model, static: Float[Array, " P"], limits) -> list[Float[Array, " P"]]:
-    """The static parameters, and others with a bump of friction at several speeds.
-
-    Presliding takes from slow slip what the bump adds, so that the identification of slip alone
-    may find one of the wrong sign or width.
-    """
-    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
-    bumps = [i for i, n in enumerate(names) if n.startswith("stribeck_force")]
-    widths = [i for i, n in enumerate(names) if n.startswith("stribeck_velocity")]
-    if not bumps or not widths:
-        return [static]
-    levels = [abs(float(v)) for n, v in zip(names, static, strict=True) if n.startswith("coulomb")]
-    others = []
-    for share in BUMPS:
-        speed = float(limits.fastest) * share
-        bumped = static.at[np.array(bumps)].set(0.3 * max(levels, default=1.0))
-        others.append(bumped.at[np.array(widths)].set(speed))
-    return [static, *others]
+def _firsts(model: Model, start: Float[Array, " P"], rows: Rows, grid: Float[Array, " G"]):
+    """For each kind its name, log σ₀ and σ₁ to begin with, and which of the two are sought."""
+    costs, dampings, dahl = map(np.asarray, scan(model, start, rows, grid))
+    place, other = int(np.nanargmin(costs)), int(np.nanargmin(dahl))
+    yield "lugre", jnp.asarray([grid[place], dampings[place]]), jnp.asarray([True, True])
+    yield "dahl", jnp.asarray([grid[other], 0.0]), jnp.asarray([True, False])
+    # The stiffest that is over within a sample: friction jumps.
+    yield "jump", jnp.asarray([grid[-1], 0.0]), jnp.asarray([False, False])
 
 
-@eqx.filter_jit
-def _refined(model: Model, first: Float[Array, " Q"], rows: _Rows):
-    """All parameters by Levenberg and Marquardt, and the cost; log σ₀, σ₁, then the static ones."""
-    scale = _scale(model, first)
-
-    def left(at, _):
-        values = _free(model, at * scale)
-        out = _left(model, values[2:], values[:2], rows)[0]
-        return jnp.where(jnp.isfinite(out), out, 1e6)
-
-    solver: Any = optx.LevenbergMarquardt(rtol=1e-6, atol=1e-6)
-    sought = _bound(model, first) / scale
-    found: Any = optx.least_squares(left, solver, sought, max_steps=ITERATIONS, throw=False)
-    return _free(model, found.value * scale), jnp.sum(left(found.value, None) ** 2)
-
-
-def _positive(model: Model) -> np.ndarray:
-    """Which of all parameters are sought by their logarithm: the nonlinear ones that are ratios."""
-    ratios = [p.logarithmic for p in model.term.nonlinear]
-    return np.array([False, False, *[False] * model.alpha.size, *ratios])
+def _compared(model: Model, rows: Rows, values: dict[str, np.ndarray]) -> tuple[Kind, ...]:
+    """The kinds, by rising number of parameters, as `deciding` compares effects."""
+    left = {name: np.asarray(linear(model, jnp.asarray(values[name]), rows)[0]) for name in KINDS}
+    power = {name: max(float(np.mean(each**2)), 1e-300) for name, each in left.items()}
+    count = independent(left[min(power, key=lambda name: power[name])])
+    force = max(float(np.mean(np.asarray(through(rows, rows.recording.force)) ** 2)), 1e-300)
+    score = {
+        name: count * np.log(power[name]) + more * np.log(count) for name, more in KINDS.items()
+    }
+    least = min(score.values())
+    return tuple(
+        Kind(name, float(np.sqrt(power[name] / force)), float(score[name] - least))
+        for name in KINDS
+    )
 
 
-def _bound(model: Model, values: Float[Array, " Q"]) -> Float[Array, " Q"]:
-    ratio = _positive(model)
-    return jnp.where(ratio, jnp.log(jnp.where(ratio, jnp.abs(values), 1.0)), values)
+def _simplest(kinds: tuple[Kind, ...]) -> str:
+    return next((each.name for each in kinds if each.above <= STRONG), "jump")
 
 
-def _free(model: Model, sought: Float[Array, " Q"]) -> Float[Array, " Q"]:
-    ratio = _positive(model)
-    return jnp.where(ratio, jnp.exp(jnp.where(ratio, sought, 0.0)), sought)
-
-
-def _scale(model: Model, first: Float[Array, " Q"]) -> Float[Array, " Q"]:
-    """Sizes of the parameters that are sought; of the damping what half a sample of z has."""
-    size = jnp.where(_positive(model), 1.0, jnp.maximum(jnp.abs(first), 1e-3 * jnp.max(first[2:])))
-    return size.at[0].set(1.0).at[1].set(1e-3 * jnp.exp(first[0]))
-
-
-@eqx.filter_jit
-def _linear(model, values, rows):
-    """What is left, its derivatives by all parameters, and the distance from steady slip."""
-    left, _, away = _left(model, values[2:], values[:2], rows)
-    slope = jax.jacfwd(lambda v: _left(model, v[2:], v[:2], rows)[0])(values)
-    return left, slope, away
-
-
-def _told(found: Any, rows: _Rows, values: np.ndarray) -> Presliding:
+def _told(found: Any, rows: Rows, values: np.ndarray) -> Presliding:
     """The estimates, with the refined model."""
-    left, slope, away = _linear(found.model, jnp.asarray(values), rows)
+    left, slope, away = linear(found.model, jnp.asarray(values), rows)
     weight = jnp.ones(left.size)
     errors = np.sqrt(np.diagonal(np.asarray(
         deviations(slope, left, weight, places(weight)).covariance
@@ -292,7 +206,10 @@ def _told(found: Any, rows: _Rows, values: np.ndarray) -> Presliding:
     ends = jnp.asarray([-1e-9, 1e-9]) * signals.scales(rows.recording).fastest
     level = float(jnp.mean(jnp.abs(bristles.dry(static.term, static.alpha, ends))))
     if not errors[0] < TOLD:
+        reach = float(np.exp(2 * errors[0]))
         why = "the stiffness is not told to within a factor of three"
+        if reach < 100:
+            why += f" (its 95 % interval reaches over a factor of {reach:.2g} each way)"
         return Presliding(None, None, level / stiffness, seconds, why)
     units = dict(model.units)
     return Presliding(
@@ -307,7 +224,7 @@ def _told(found: Any, rows: _Rows, values: np.ndarray) -> Presliding:
 
 
 def sentence(test: Presliding, units: dict[str, str]) -> str:
-    """What the bristles are, in a line."""
+    """What the bristles are, in a line, and what of Dahl's and LuGre's the recording asks for."""
     if test.stiffness is None or test.damping is None:
         return f"Presliding: no stiffness of bristles; {test.why}."
     low, high = test.stiffness.interval()
@@ -319,3 +236,18 @@ def sentence(test: Presliding, units: dict[str, str]) -> str:
         f"{0.5 * float(high - low):.2g} {test.damping.unit}; over {test.distance:.2g} "
         f"{units['position']}."
     )
+
+
+def comparison(test: Presliding) -> list[Block]:
+    """The kinds of friction at rest as a table, and what follows."""
+    if not test.kinds:
+        return []
+    table = [["", "friction at rest", "force left", "criterion above the least"]]
+    for each in test.kinds:
+        mark = "*" if each.name == test.kind else "=" if each.above <= STRONG else ""
+        error, above = f"{each.filtered_force_error:.3%}", f"{each.above:.1f}"
+        table.append([mark, NAMES[each.name], error, above])
+    said = f"* {SAID[test.kind]}"
+    if test.kind != "jump":
+        said += ". Cogging, backlash or a lag may look so: jaxfric explain compares them."
+    return [Table(table, (2, 3)), [said]]
