@@ -1,19 +1,22 @@
 """`jaxfric explain --mujoco`: a simulator's joints against a log, and its file put right."""
 
+import dataclasses
 import os
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..data.io import read_with_notes
-from ..data.joints import columns_of
+from ..data.joints import columns_of, references_of
 from ..data.provenance import sha256
 from ..data.recording import Recording
 from ..data.tables import load
 from ..explanation import Explanation, explain
 from ..explanation.sanity import Check, Looked, Part, look
-from ..export.patch import Patch, patch
+from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
 from ..simulators import Mujoco
@@ -36,6 +39,8 @@ class Joint(NamedTuple):
     logs: list[Recording]
     simulator: Mujoco | None
     notes: list[str]
+    reference: np.ndarray | None = None
+    commanded: Recording | None = None
     corrected: tuple[str, ...] = ()
 
 
@@ -113,16 +118,21 @@ def _columns(path: str, joints: list[str], arguments: Namespace) -> dict[str, di
 
 def _opened(name: str, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
     """One joint's recordings and simulator, not explained yet."""
-    logs, notes = [], list[str]()
+    logs, notes = list[Recording](), list[str]()
+    reference: np.ndarray | None = None
     try:
         simulator = Mujoco(arguments.mujoco, name, shared=shared)
         for path, own in zip(paths, columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)
-            logs.append(log)
+            channels = dict(log.channels)
+            wanted = channels.pop("reference", None)
+            if wanted is not None and not logs:
+                reference = np.asarray(wanted, float)
+            logs.append(dataclasses.replace(log, channels=channels))
             notes += more
     except ValueError as error:
         return Joint(name, None, _refusal(error, paths), logs, None, notes)
-    return Joint(name, None, "", logs, simulator, notes)
+    return Joint(name, None, "", logs, simulator, notes, reference, logs[0])
 
 
 def _refusal(error: ValueError, paths: Sequence[str]) -> str:
@@ -174,6 +184,8 @@ def _joint(joint: Joint, looked: Looked | None, source, shared, arguments: Names
         return joint._replace(error=_refusal(error, [log.source for log in logs]))
     if looked is not None and looked.changed:
         logs = [log for log in (looked.part.recording, looked.part.holdout) if log is not None]
+        if looked.faults.clock:
+            joint = joint._replace(commanded=logs[0])
     return joint._replace(told=told, simulator=simulator, logs=logs)
 
 
@@ -189,13 +201,17 @@ def _log(
     else:
         others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
         roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
+        wanted = references_of(load(Path(path)).columns, list(own), arguments.columns)
+        if name in wanted:
+            roles["reference"] = wanted[name]
         for role in ("time", "segment"):
             if role in arguments.columns:
                 roles[role] = arguments.columns[role]
         if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:
             roles["segment"] = "segment"
         turned = arguments.scale.get("position")
-        scale = arguments.scale | ({} if turned is None else dict.fromkeys(others, turned))
+        turns = [*others, *(["reference"] if name in wanted else [])]
+        scale = arguments.scale | ({} if turned is None else dict.fromkeys(turns, turned))
         log, notes = read_with_notes(
             path, columns=roles, scale=scale, units=units, period=arguments.period,
             repair=arguments.repair, rate=arguments.rate,
@@ -224,6 +240,11 @@ def _patched(arguments: Namespace, done: list[Joint]) -> Patch | None:
         {joint.name: joint.told for joint in done if joint.told is not None},
         {joint.name: joint.logs for joint in done},
         arguments.save,
+        Again(
+            {joint.name: joint.simulator for joint in done if joint.simulator is not None},
+            {joint.name: joint.commanded for joint in done if joint.commanded is not None},
+            {joint.name: joint.reference for joint in done if joint.reference is not None},
+        ),
     )
 
 
@@ -303,7 +324,7 @@ def _pages(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict
     """The page of a joint; of several one of the robot, and theirs behind it."""
     documents_ = [_document(arguments, joint) for joint in found]
     if len(found) == 1:
-        return {arguments.report: _page(arguments, documents_[0], found[0])}
+        return {arguments.report: _page(arguments, documents_[0], found[0], done)}
     path = Path(arguments.report)
     if standard(arguments.report):
         raise ValueError("--report -: several joints have a page each; name a file.")
@@ -311,15 +332,21 @@ def _pages(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict
     for joint, document in zip(found, documents_, strict=True):
         if joint.told is not None:
             links[joint.name] = f"{path.stem}_{joint.name}.html"
-            texts[str(path.with_name(links[joint.name]))] = _page(arguments, document, joint)
+            texts[str(path.with_name(links[joint.name]))] = _page(arguments, document, joint, done)
     rows = [_row(joint) for joint in found]
     lines = [] if done is None else [*done.written, *(f"not written: {x}" for x in done.left)]
-    whole = robot.render(arguments.mujoco, arguments.file, rows, links, lines)
+    again = [] if done is None else [done.rerun.curves(name) for name in done.rerun.joints]
+    whole = robot.render(arguments.mujoco, arguments.file, rows, links, lines, again)
     return {arguments.report: whole} | texts
 
 
-def _page(arguments: Namespace, document: Mapping[str, Any], joint: Joint) -> str:
-    return page.render(document, joint.told.curves if joint.told else {}, arguments.typed, today())
+def _page(
+    arguments: Namespace, document: Mapping[str, Any], joint: Joint, done: Patch | None
+) -> str:
+    curves = joint.told.curves if joint.told else {}
+    if done is not None and joint.name in done.rerun.joints:
+        curves = curves | {"rerun": done.rerun.curves(joint.name)}
+    return page.render(document, curves, arguments.typed, today())
 
 
 def _print(arguments: Namespace, found: list[Joint], done: Patch | None) -> None:

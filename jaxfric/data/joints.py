@@ -57,6 +57,23 @@ def columns_of(
     return {joint: roles for joint, roles in picked.items() if "position" in roles}
 
 
+def references_of(
+    columns: Iterable[str], joints: Sequence[str], given: Mapping[str, str]
+) -> dict[str, str]:
+    """The column of each joint's reference, where there is one and no more."""
+    names, found = list(columns), dict[str, list[str]]()
+    for name in names:
+        for joint, role in _named(name, joints):
+            if role == "reference":
+                found.setdefault(joint, []).append(name)
+    if not found and (family := _numbered(names).get("reference")) and len(family) == len(joints):
+        found = {joint: [family[n]] for joint, n in zip(joints, sorted(family), strict=True)}
+    for joint in joints:
+        if (own := given.get(f"{joint}_reference")) in names:
+            found[joint] = [own]
+    return {joint: some[0] for joint, some in found.items() if len(some) == 1}
+
+
 def _named(name: str, joints: Sequence[str]) -> list[tuple[str, str]]:
     """The joint whose name is part of a column's, and the role of the rest; the longest name."""
     words, best = _words(name), list[tuple[int, str, str]]()

@@ -13,16 +13,23 @@ from ..explanation.attributes import CONSTANT, GAIN, MISMATCH
 from ..explanation.errors import through_kernel
 from ..models import Model
 from ..simulators import Mujoco
+from ..simulators.columns import actuator_of
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
 from . import callback
+from .rerun import Rerun, rerun
 
-UNKNOWN_LOOP = (
-    "Compared along the recorded motion: the log does not hold the controller, without which the "
-    "loop cannot be run again."
-)
+
+class Again(NamedTuple):
+    """What a closed loop needs: by joint the log's simulators, its recordings with the commands as
+    they were given, and the references, `(N,)`.
+    """
+
+    simulators: dict[str, Mujoco]
+    logs: dict[str, Recording]
+    references: dict[str, np.ndarray]
 
 
 class Patch(NamedTuple):
@@ -41,12 +48,13 @@ class Patch(NamedTuple):
     left: list[str]
     errors: dict[str, dict[str, dict[str, float]]]
     module: str
+    rerun: Rerun = Rerun()
 
     def to_dict(self) -> dict[str, Any]:
         """What was done as plain data, without the texts."""
         return {
             "written": self.written, "left": self.left, "errors": self.errors,
-            "remark": UNKNOWN_LOOP,
+            "rerun": self.rerun.to_dict(),
         }  # fmt: skip
 
 
@@ -55,16 +63,21 @@ def patch(
     found: dict[str, Explanation],
     recordings: dict[str, list[Recording]],
     name: str,
+    again: Again | None = None,
 ) -> Patch:
     """The simulator's file with the findings of its joints.
 
     **Arguments:** `source`, the file; by joint, the outermost last: the explanations, each of which
     takes the bodies as those farther out have corrected them, and the recordings (the first is the
-    one explained, the second held out); `name` of the file to be, for the module beside it.
+    one explained, the second held out); `name` of the file to be, for the module beside it;
+    `again`, what a closed loop needs to be run again.
     """
     values: dict[str, tuple[float, float]] = {}
     left: list[str] = []
     for joint, told in reversed(found.items()):
+        attributes, more = _put_right(source, joint, told)
+        values |= attributes
+        left += more
         for key, moved in _moved(told).items():
             if key == GAIN:
                 left.append(_unwritten(joint, moved))
@@ -98,7 +111,61 @@ def patch(
             Mujoco(done.text, joint, folder_of(source), shared),
         )
         errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
-    return Patch(done.text, forces, written, left, errors, module)
+    patch = Patch(done.text, forces, written, left, errors, module)
+    return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+def _put_right(source, joint: str, told: Explanation):
+    """What was put right before any physics, and a dead time, as attributes; and what has none."""
+    model = Mujoco(source, joint)
+    values: dict[str, tuple[float, float]] = {}
+    left = []
+    for finding in told.findings:
+        if finding.effect == "position_zero" and finding.attribute:
+            (zero,) = finding.parameters.values()
+            before = float(model.model.qpos0[model.joints.index(finding.attribute.split("/")[1])])
+            values[finding.attribute] = before, before + float(zero.value)
+        elif finding.effect == "force_limit" and finding.attribute:
+            (limit,) = finding.parameters.values()
+            values[finding.attribute] = float("inf"), float(limit.value)
+        elif finding.effect == "transport_delay":
+            delay = float(finding.parameters["delay"].value)
+            number = actuator_of(model.mujoco, model.model, model.number)
+            if number is None:
+                left.append(f"joint {joint}: a delay of {delay:.4g} s: it has no actuator for it")
+            else:
+                name = model.model.actuator(number).name or f"actuator{number + 1}"
+                values[f"actuator/{name}/delay"] = 0.0, delay
+        elif finding.effect == "clock":
+            left.append(f"joint {joint}: the clock of the force: it is the log's, not the model's")
+    return values, left
+
+
+def _again(source, patch: Patch, found: dict[str, Explanation], again: Again) -> Rerun:
+    """Both models run again, the one after with what its file cannot hold beside it."""
+    space: dict[str, Any] = {}
+    if patch.forces is not None:
+        exec(compile(patch.forces, patch.module, "exec"), space)
+    return rerun(
+        source, patch.text, folder_of(source), again.simulators, again.logs, again.references,
+        {joint: _acting(told) for joint, told in found.items()}, space.get("FORCES", {}),
+    )  # fmt: skip
+
+
+def _acting(told: Explanation) -> tuple[float, float, float]:
+    """Gain, limit and dead time between the recorded command and the joint."""
+    gain, limit, delay = 1.0, np.inf, 0.0
+    for name, moved in _moved(told).items():
+        if name == GAIN:
+            gain = float(moved.value)
+        elif name.endswith("/gear"):
+            gain = float(moved.before) / float(moved.value)
+    for finding in told.findings:
+        if finding.effect == "force_limit":
+            limit = float(next(iter(finding.parameters.values())).value)
+        elif finding.effect in ("transport_delay", "actuator_lag"):
+            delay = float(next(iter(finding.parameters.values())).value)
+    return gain, limit, delay
 
 
 def _moved(told: Explanation):

@@ -319,5 +319,21 @@ def patch(path: str, document: Mapping[str, Any]) -> str:
             held = "held out" if name.startswith("holdout") else "recording"
             cells = [f"{error[w]:.2%}" if w in error else "" for w in ("before", "file", "forces")]
             table.append([f"{joint}, {held}", *cells])
-    lines += ["", *aligned(table, (1, 2, 3)), "", *wrapped(document["remark"])]
+    lines += ["", *aligned(table, (1, 2, 3)), *_rerun(document["rerun"])]
     return "\n".join(lines)
+
+
+def _rerun(document: Mapping[str, Any]) -> list[str]:
+    """The closed loops that were run again."""
+    if not document["joints"]:
+        return ["", *wrapped(document["remark"])] if document["remark"] else []
+    table = [["run again", "off the recording", "after", "tracking, recorded", "before", "after"]]
+    for row in document["joints"]:
+        off, track = row["deviation"], row["tracking_error"]
+        cells = [off["before"], off["after"], track["recorded"], track["before"], track["after"]]
+        table.append([row["joint"], *(f"{cell:.3g}" for cell in cells)])
+    said = (
+        "Root mean squares, rad or m, of the closed loop with the recording's reference and its "
+        f"controller ({document['controller']})."
+    )
+    return ["", *aligned(table, (1, 2, 3, 4, 5)), "", *wrapped(said)]

@@ -113,6 +113,17 @@ def finding(entry: Curves, force: str) -> Chart:
     )
 
 
+def rerun(entry: Curves) -> Chart:
+    """How far the closed loops that were run again are off the recording."""
+    return chart(
+        f"{entry['joint']}: off the recording, run again",
+        ("time", "s"),
+        ("deviation of the position", entry["unit"]),
+        entry["time"],
+        [line(when, when, entry.get(when)) for when in ("before", "after")],
+    )
+
+
 def in_time(curves: Curves, force: str) -> list[Chart]:
     """Measured and predicted force over time, and below what is left of it."""
     time, measured = curves["time"], curves["measured"]

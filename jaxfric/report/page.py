@@ -1,7 +1,9 @@
 """The HTML page of an explanation: one file that needs no network, for the screen and for paper."""
 
+import json
 import math
 from collections.abc import Mapping
+from html import escape
 from importlib import resources
 from pathlib import PurePath
 from typing import Any
@@ -29,6 +31,24 @@ def verdict_name(verdict: str) -> str:
 def style() -> str:
     """The style sheet of the page."""
     return _asset("page.css")
+
+
+def picture(chart: Mapping[str, Any]) -> str:
+    """One picture, for pages that no template makes; [`scripts`][] draws it."""
+    title, data = escape(chart["title"]), json.dumps(chart).replace("<", "\\u003c")
+    data = f'<script type="application/json">{data}</script>'
+    return (
+        f"<figure><figcaption>{title}</figcaption>"
+        f'<div class="chart" role="img" aria-label="{title}">{data}</div></figure>'
+    )
+
+
+def scripts() -> str:
+    """What draws the pictures of a page."""
+    style = f"<style>{_asset('uPlot.min.css')}</style>"
+    return style + "".join(
+        f"<script>{_asset(name)}</script>" for name in ("uPlot.iife.min.js", "page.js")
+    )
 
 
 def library():
@@ -147,6 +167,7 @@ def _pictures(document, curves, units: Mapping[str, str]) -> dict[str, Any]:
             charts.mismatch(p, force, added=False) for p in list(reversed(rest.values()))[:MAPS]
         ],
         "time": charts.in_time(time, force) if time else None,
+        "rerun": charts.rerun(curves["rerun"]) if curves.get("rerun") else None,
         "holdout": charts.in_time(held, force)[1] if held else None,
         "friction": friction,
         "one_sided": min(velocity) > 0 or max(velocity) < 0,

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from .page import style, verdict_name
+from . import charts
+from .page import picture, scripts, style, verdict_name
 
 
 def render(
@@ -15,12 +16,15 @@ def render(
     rows: Sequence[Mapping[str, Any]],
     links: Mapping[str, str],
     lines: Sequence[str] = (),
+    again: Sequence[Mapping[str, Any]] = (),
 ) -> str:
     """The page, HTML that loads nothing from elsewhere.
 
     **Arguments:** `rows` of the joints as in the document; `links` to their pages by joint;
-    `lines`, what was written into the simulator's file.
+    `lines`, what was written into the simulator's file; `again`, of each joint the closed loops
+    that were run again.
     """
+    pictures = "".join(picture(charts.rerun(each)) for each in again)
     name = f"{Path(simulator).name} against {Path(log).name}"
     body = "".join(_row(row, links.get(row["joint"])) for row in rows)
     done = "".join(f"<li>{escape(line)}</li>" for line in lines)
@@ -43,6 +47,7 @@ def render(
 <p class="note">Force errors before → after, through the kernel by which effects are looked for.</p>
 </section>
 {f"<section><h2>The simulator's file</h2><ul>{done}</ul></section>" if done else ""}
+{f"<section><h2>Run again</h2>{pictures}</section>{scripts()}" if pictures else ""}
 </body>
 </html>
 """

@@ -1,5 +1,6 @@
 """Other programs' simulators as baselines: their force along the recorded motion, as it is."""
 
+from . import closed as closed
 from .known import (
     AbstractSimulator as AbstractSimulator,
     Attribute as Attribute,

@@ -69,7 +69,7 @@ def _groups(values: Mapping[str, float]) -> list[dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for key, value in values.items():
         kind, owner, what = key.split("/")
-        whole = kind == "body" or what in ("stiffness", "springref")
+        whole = kind == "body" or what in ("stiffness", "springref", "ref")
         found.setdefault(f"{kind}/{owner}" if whole else key, {})[key] = value
     return list(found.values())
 
@@ -90,7 +90,7 @@ def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> 
         joint = names.index(owner)
         changes[tree.joints[joint]] = _of_joint(mujoco, model, joint, own, found)
     elif kind == "actuator":
-        changes |= _of_actuator(mujoco, model, owner, own["gear"], found)
+        changes |= _of_actuator(mujoco, model, owner, own, found)
     else:
         body = next(b for b in range(1, model.nbody) if (model.body(b).name or f"body{b}") == owner)
         _of_body(mujoco, model, body, own, found, tree, changes, new)
@@ -102,14 +102,24 @@ def _number(value: float) -> str:
 
 
 def _of_joint(mujoco: Any, model: Any, joint: int, own: Mapping[str, float], found: list[Tag]):
-    if any(value < 0 for name, value in own.items() if name != "springref"):
+    if any(value < 0 for name, value in own.items() if name not in ANGLES):
         raise ValueError("it would be below zero")
     degrees = is_hinge(mujoco, model, joint) and _in_degrees(found)
     scale = 180 / np.pi if degrees else 1.0
-    return {
-        name: _number(value * (scale if name == "springref" else 1.0))
-        for name, value in own.items()
+    own = dict(own)
+    if "ref" in own and "springref" not in own and model.jnt_stiffness[joint]:
+        # The spring rests where it did, in angles that count from elsewhere.
+        own["springref"] = float(model.qpos_spring[joint] + own["ref"] - model.qpos0[joint])
+    written: dict[str, str | None] = {
+        name: _number(value * (scale if name in ANGLES else 1.0)) for name, value in own.items()
     }
+    if LIMIT in own:
+        written[LIMIT] = f"{_number(-own[LIMIT])} {_number(own[LIMIT])}"
+    return written
+
+
+# Attributes that are positions of a joint; the range of all actuators' force at a joint.
+ANGLES, LIMIT = ("springref", "ref"), "actuatorfrcrange"
 
 
 def _in_degrees(found: list[Tag]) -> bool:
@@ -119,7 +129,9 @@ def _in_degrees(found: list[Tag]) -> bool:
     return not angles or angles[-1] != "radian"
 
 
-def _of_actuator(mujoco: Any, model: Any, owner: str, gear: float, found: list[Tag]):
+def _of_actuator(
+    mujoco: Any, model: Any, owner: str, values: Mapping[str, float], found: list[Tag]
+):
     section = [i for i, tag in enumerate(found) if tag.name == "actuator"]
     own = [i for i, tag in enumerate(found) if tag.parent in section]
     number = next(
@@ -127,8 +139,15 @@ def _of_actuator(mujoco: Any, model: Any, owner: str, gear: float, found: list[T
     )
     if len(own) != model.nu:
         raise ValueError("its actuators are not all written out in this file")
-    before = found[own[number]].attributes.get("gear", "1").split()
-    return {own[number]: {"gear": " ".join([_number(gear), *before[1:]])}}
+    written: dict[str, str | None] = {}
+    if "gear" in values:
+        before = found[own[number]].attributes.get("gear", "1").split()
+        written["gear"] = " ".join([_number(values["gear"]), *before[1:]])
+    if "delay" in values:
+        # As many commands are kept as the delay holds.
+        count = int(np.ceil(values["delay"] / model.opt.timestep)) + 1
+        written |= {"delay": _number(values["delay"]), "nsample": str(count)}
+    return {own[number]: written}
 
 
 def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, new) -> None:
@@ -184,11 +203,13 @@ def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
             place = {
                 "stiffness": new.jnt_stiffness, "springref": new.qpos_spring,
                 "damping": new.dof_damping, "frictionloss": new.dof_frictionloss,
-                "armature": new.dof_armature,
+                "armature": new.dof_armature, "ref": new.qpos0, LIMIT: new.jnt_actfrcrange[:, 1],
             }  # fmt: skip
             read_back = float(place[what][joint])
         elif kind == "actuator":
-            read_back = float(new.actuator_gear[new.actuator(owner).id, 0])
+            number = new.actuator(owner).id
+            kept = new.actuator_gear[:, 0] if what == "gear" else new.actuator_delay
+            read_back = float(kept[number])
         else:
             body = next(b for b in range(1, new.nbody) if (new.body(b).name or f"body{b}") == owner)
             whole = _wanted(mujoco, old, body, {k.split("/")[2]: v for k, v in group.items()})

@@ -1,0 +1,213 @@
+"""A simulator's closed loop: the same reference and controller as the recording's, run again.
+
+The controller is that of the model where it has a servo for each joint (`position` actuators);
+else it is read off the log, whose force it computed: u = k_p e + k_d ė + k_b b(q, v) + …, e the
+error of the position, b the force of gravity and motion that computed-torque controllers add.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from .inverse import Motion
+
+# What a law of control leaves of the command: more, and it is another one.
+LEFT = 0.1
+# A further part of the law has to take a tenth of the error that is left.
+WORTH = 0.9
+# Without the axis following, the run says nothing: this many times the motion's range.
+LOST = 10.0
+
+# The force at a joint that no attribute says, from its position, its speed and the time.
+Beside = Callable[[float, float, float], float]
+
+
+class Log(NamedTuple):
+    """All joints of a recording, in the model's order: time, s, `(N,)`, and `(N, dof)` each."""
+
+    time: Float[np.ndarray, " N"]
+    motion: Motion
+    force: Float[np.ndarray, "N dof"]
+    reference: Float[np.ndarray, "N dof"]
+
+
+class Law(NamedTuple):
+    """A controller: the gains of its parts, `(dof, parts)`, and what it leaves of each command."""
+
+    parts: tuple[str, ...]
+    gains: np.ndarray
+    left: np.ndarray
+
+    @property
+    def known(self) -> bool:
+        """Whether it is the log's law."""
+        return bool(np.all(self.left <= LEFT))
+
+
+# In the order in which they are asked for; the first two always.
+PARTS = ("position error", "velocity error", "gravity and motion", "constant", "integral",
+         "acceleration")  # fmt: skip
+
+
+def bias(mujoco: Any, model: Any, motion: Motion) -> np.ndarray:
+    """Gravity, centrifugal and Coriolis forces along a motion, `(N, dof)`."""
+    data, found = mujoco.MjData(model), np.empty(motion.position.shape)
+    for i in range(len(found)):
+        data.qpos[:], data.qvel[:] = motion.position[i], motion.velocity[i]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        found[i] = data.qfrc_bias
+    return found
+
+
+def law_of(mujoco: Any, model: Any, log: Log) -> Law:
+    """The controller that the log's force and reference speak of, joint by joint.
+
+    Least squares of the recorded force by the parts of a law, of which those beyond the first two
+    have to be worth it for some joint.
+    """
+    weight = bias(mujoco, model, log.motion)
+    goal = np.gradient(log.reference, log.time, axis=0)
+    error = log.reference - log.motion.position
+    step = np.diff(log.time, prepend=log.time[0])[:, None]
+    every = {
+        "position error": error,
+        "velocity error": goal - log.motion.velocity,
+        "gravity and motion": weight,
+        "constant": np.ones_like(error),
+        "integral": np.cumsum(error * step, axis=0),
+        "acceleration": np.gradient(goal, log.time, axis=0),
+    }
+    chosen = list(PARTS[:2])
+    gains, left = _fitted(every, chosen, log.force)
+    for part in PARTS[2:]:
+        more, less = _fitted(every, [*chosen, part], log.force)
+        if np.any(less < WORTH * left):
+            chosen, gains, left = [*chosen, part], more, less
+    return Law(tuple(chosen), gains, left)
+
+
+def _fitted(every: Mapping[str, np.ndarray], chosen: Sequence[str], force: np.ndarray):
+    gains, left = [], []
+    for joint in range(force.shape[1]):
+        columns = np.stack([every[part][:, joint] for part in chosen], axis=1)
+        size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        solved = np.linalg.lstsq(columns / size, force[:, joint], rcond=1e-9)[0] / size
+        gains.append(solved)
+        rest = force[:, joint] - columns @ solved
+        whole = max(float(np.linalg.norm(force[:, joint])), 1e-300)
+        left.append(float(np.linalg.norm(rest)) / whole)
+    return np.array(gains), np.array(left)
+
+
+def servos(mujoco: Any, model: Any) -> bool:
+    """Whether each joint has one actuator that follows a position, as `position` ones do."""
+    joints = sorted(int(j) for j in model.actuator_trnid[:, 0])
+    own = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
+    pulls = np.isclose(model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 1])
+    able = model.nu == model.nv and joints == list(range(model.nv))
+    return bool(able and np.all(own) and np.all(pulls & (model.actuator_gainprm[:, 0] > 0)))
+
+
+class Actuation(NamedTuple):
+    """What stands between command and joint: gain, limit, N, and dead time, s, each `(dof,)`."""
+
+    gain: np.ndarray
+    limit: np.ndarray
+    delay: np.ndarray
+
+
+def ideal(dof: int) -> Actuation:
+    """Commands that arrive as they are."""
+    return Actuation(np.ones(dof), np.full(dof, np.inf), np.zeros(dof))
+
+
+def run(
+    mujoco: Any,
+    model: Any,
+    log: Log,
+    law: Law | None,
+    actuation: Actuation,
+    beside: Mapping[int, Beside] | None = None,
+) -> Float[np.ndarray, "N dof"] | None:
+    """The positions of the closed loop at the log's times; `None` where it does not follow.
+
+    **Arguments:** `law`, or `None` for the model's own servos; `beside`, forces by joint that the
+    model has no attribute for.
+    """
+    steps = max(1, round(float(np.median(np.diff(log.time))) / model.opt.timestep))
+    kept = float(model.opt.timestep)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = log.motion.position[0], log.motion.velocity[0]
+    found = np.full(log.motion.position.shape, np.nan)
+    loop = _Loop(model, log, law, actuation)
+    most = LOST * np.ptp(log.motion.position, axis=0)
+    for i, (start, span) in enumerate(
+        zip(log.time, np.diff(log.time, append=log.time[-1]), strict=True)
+    ):
+        found[i] = data.qpos
+        if not np.all(np.abs(data.qpos - log.motion.position[i]) <= most):
+            model.opt.timestep = kept
+            return None
+        model.opt.timestep = max(span / steps, 1e-9)
+        for k in range(steps if span > 0 else 0):
+            mujoco.mj_step1(model, data)
+            loop.drive(data, float(start) + k * model.opt.timestep)
+            for joint, force in (beside or {}).items():
+                data.qfrc_applied[joint] -= force(data.qpos[joint], data.qvel[joint], data.time)
+            mujoco.mj_step2(model, data)
+    model.opt.timestep = kept
+    return found
+
+
+class _Loop:
+    """A controller at work."""
+
+    def __init__(self, model: Any, log: Log, law: Law | None, actuation: Actuation):
+        self.log, self.law, self.actuation = log, law, actuation
+        goal = np.gradient(log.reference, log.time, axis=0)
+        self.goals = [log.reference, goal, np.gradient(goal, log.time, axis=0)]
+        self.sum, self.before = np.zeros(model.nv), float(log.time[0])
+        self.joints = [int(j) for j in model.actuator_trnid[:, 0]] if law is None else []
+        self.late: list[tuple[float, np.ndarray]] = []
+
+    def drive(self, data: Any, now: float) -> None:
+        """Set the command of one step."""
+        place = int(np.searchsorted(self.log.time, now, side="right")) - 1
+        place = int(np.clip(place, 0, len(self.log.time) - 2))
+        span = self.log.time[place + 1] - self.log.time[place]
+        share = (now - self.log.time[place]) / span if span > 0 else 0.0
+        wanted, speed, rate = (g[place] + share * (g[place + 1] - g[place]) for g in self.goals)
+        if self.law is None:
+            data.ctrl[:] = wanted[self.joints]
+            data.qfrc_applied[:] = 0.0
+            return
+        error = wanted - data.qpos
+        self.sum += error * (now - self.before)
+        self.before = now
+        values = {
+            "position error": error,
+            "velocity error": speed - data.qvel,
+            "gravity and motion": data.qfrc_bias,
+            "constant": np.ones_like(error),
+            "integral": self.sum,
+            "acceleration": rate,
+        }
+        asked = sum(self.law.gains[:, i] * values[p] for i, p in enumerate(self.law.parts))
+        data.qfrc_applied[:] = self._arriving(np.asarray(asked), now)
+
+    def _arriving(self, asked: np.ndarray, now: float) -> np.ndarray:
+        gain, limit, delay = self.actuation
+        asked = np.clip(asked, -limit, limit) / gain
+        if not np.any(delay > 0):
+            return asked
+        self.late.append((now, asked))
+        arrives = self.late[0][1].copy()
+        for time, command in self.late:
+            arrives = np.where(time <= now - delay, command, arrives)
+        longest = float(np.max(delay))
+        while len(self.late) > 1 and self.late[1][0] <= now - longest:
+            self.late.pop(0)
+        return arrives
