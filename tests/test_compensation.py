@@ -90,7 +90,7 @@ def test_export_says_what_feed_forward_would_be_worth(tmp_path, capsys, monkeypa
     found = benefit(machine(), reference())
     assert f"{found.without.error:.3g} m rms without" in said, said
     assert f"{found.error_removed:.0%} removed" in said
-    assert "with pd:kp=50000,kd=1000" in said and "the most that can be had" in said
+    assert "with pd:kp=50000,kd=1000" in said and "This is optimistic" in said
 
 
 def test_an_explanation_compares_feed_forward_by_both_models():

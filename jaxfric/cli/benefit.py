@@ -24,7 +24,7 @@ def simulated(model: Model, reference: Recording, controller, notes, arguments) 
     if controller is None:
         notes = [*notes, f"No controller is given; taken is {chosen} (--controller)."]
     units = dict(model.units)
-    by = arguments.compensate or "the model itself, the most that can be had"
+    by = arguments.compensate or "the model itself"
     columns = {"time": found.run.time, "force": found.run.force, "position": found.run.position}
     if arguments.json:
         document = {"schema": "jaxfric.benefit/1", "units": units, "assumed": ASSUMED}
@@ -79,7 +79,7 @@ def exported(model: Model, reference: Recording, arguments: Namespace) -> str:
         raise ValueError(f"{arguments.model}, {arguments.reference}: {error}") from error
     return (
         f"Predicted benefit as feed-forward along {arguments.reference}, with {chosen}:\n"
-        f"{told(found, dict(model.units))}\n{ASSUMED} It is the most that can be had."
+        f"{told(found, dict(model.units))}\n{ASSUMED} This is optimistic: the machine will differ."
     )
 
 

@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from .. import models as known
+from ..data import summary
 from ..data.io import read_with_notes, write_bytes, write_table, write_text
 from ..data.recording import Recording, uniform
 from ..data.writing import csv_text
@@ -49,6 +50,13 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
         served=True,
         **more,
     )
+
+
+def stated(recording: Recording) -> str:
+    """The rate and the units that a recording is read in."""
+    rate = summary.facts(recording)["sample_rate"]
+    named = [f"{name} in {unit}" for name, unit in recording.unit_names.items()]
+    return ", ".join([f"{rate:.6g} Hz"] * bool(rate) + named)
 
 
 def fitted(
@@ -99,7 +107,7 @@ def selection(arguments: Namespace) -> int:
         done.append({"file": path, "notes": notes} | found.to_dict())
         if not _printed(arguments):
             say(
-                text([[f"{path}:", *notes], *tabulate.standings(done[-1])])
+                text([[f"{path}: {stated(recording)}", *notes], *tabulate.standings(done[-1])])
                 + "\n" * (len(arguments.files) > 1)
             )
     if arguments.json and done:
@@ -191,7 +199,7 @@ def put(path: str, text: str) -> None:
         write_text(path, text)
 
 
-def put_table(path: str, columns: Mapping[str, Any], notes: Sequence[str], summary: str) -> None:
+def put_table(path: str, columns: Mapping[str, Any], notes: Sequence[str], told: str) -> None:
     """Write a table, to standard output for `-`, and say what it is."""
     if path == "-":
         arrays = {name: np.asarray(column) for name, column in columns.items()}
@@ -199,7 +207,7 @@ def put_table(path: str, columns: Mapping[str, Any], notes: Sequence[str], summa
     else:
         write_table(path, columns)
     beside = sys.stderr if standard(path) else sys.stdout
-    say("\n".join([*(f"  {note}" for note in notes), f"{path}: {summary}"]), file=beside)
+    say("\n".join([*(f"  {note}" for note in notes), f"{path}: {told}"]), file=beside)
 
 
 @contextmanager
@@ -249,6 +257,7 @@ def predict(arguments: Namespace) -> int:
     error = relative(left[moving], measured[moving])
     share = f"{error:.2%}" if np.isfinite(error) else "undefined: no slip, or no force"
     columns["in_motion"] = moving.astype(int)
+    notes = [stated(recording), *notes]
     put_table(arguments.out, columns, notes, f"{force.size} samples; force error {share}")
     return 0
 

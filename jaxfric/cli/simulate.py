@@ -7,7 +7,7 @@ import numpy as np
 from ..simulation import control
 from ..simulation.simulating import simulate
 from . import benefit
-from .commands import _in_units, _load, put_table, read
+from .commands import _in_units, _load, put_table, read, stated
 
 
 def run(arguments: Namespace) -> int:
@@ -41,5 +41,6 @@ def run(arguments: Namespace) -> int:
     columns = {"time": run.time, "force": run.force, "position": run.position}
     if run.velocity is not None:
         columns["velocity"] = run.velocity
+    notes = [stated(run), *notes]
     put_table(arguments.out, columns | run.channels, notes, f"{run.num_samples} samples")
     return 0

@@ -239,7 +239,10 @@ def explained(document: Mapping[str, Any]) -> list[Block]:
     facts = document["recording"]
     file = printable(facts["file"])
     whose = f"{file}: " if file else ""  # made in Python, and not named
-    source = [f"{whose}{facts['samples']} samples, {facts['duration']:.4g} s"]
+    rate, units = facts.get("sample_rate"), (document.get("model") or {}).get("units") or {}
+    at = f" at {rate:.6g} Hz" if rate else ""
+    named = "".join(f", {name} in {printable(unit)}" for name, unit in units.items())
+    source = [f"{whose}{facts['samples']} samples, {facts['duration']:.4g} s{at}{named}"]
     source += [f"  {note}" for note in facts.get("notes", [])]
     said = [f"{document['verdict']}: {document['summary']}", *warnings(document)]
     motion = document["fit"].get("simulation_error")

@@ -102,7 +102,7 @@ def benefit(
     **Arguments:** `machine`, the model that stands for the machine; `reference`, time and
     set-point, of shape `(N,)`, as [`simulate`][jaxfric.simulation.simulating.simulate] takes them;
     `controller`, by default [`usual`][]; `drive`, the model that the drive computes with, by
-    default the machine's own, which gives the most that can be had.
+    default the machine's own, which is optimistic.
 
     **Raises:** `ValueError` for several segments, and as `simulate` and `predict` do.
     """
