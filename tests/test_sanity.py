@@ -25,20 +25,27 @@ UNITS = {"force": "N·m", "position": "rad"}
 @pytest.fixture(scope="module")
 def motion():
     """Time, positions and forces of both joints, `(N, 2)`, by MuJoCo's inverse dynamics."""
-    draw, model = np.random.default_rng(1), mujoco.MjModel.from_xml_string(ARM)
+    draw = np.random.default_rng(1)
     time = np.arange(0, 12, 0.002)
     rates = 2 * np.pi * np.array([0.3, 0.7, 1.3])
     phases, sizes = draw.uniform(0, 6, (2, 3)), np.array([0.5, 0.2, 0.1])
     angle = rates * time[:, None, None] + phases
     position, speed = np.sin(angle) @ sizes, np.cos(angle) @ (rates * sizes)
-    force, data = np.empty_like(position), mujoco.MjData(model)
-    for i, acceleration in enumerate(-np.sin(angle) @ (rates**2 * sizes)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = position[i], speed[i], acceleration
-        mujoco.mj_inverse(model, data)
-        force[i] = data.qfrc_inverse
+    force = needed(ARM, position, speed, -np.sin(angle) @ (rates**2 * sizes))
     count = 2 * np.pi / 2**17
     noisy = force + 0.005 * force.std(axis=0) * draw.normal(size=force.shape)
     return time, count * np.round(position / count), noisy
+
+
+def needed(text, position, speed, acceleration):
+    """The force of both joints along a motion, `(N, 2)`."""
+    model = mujoco.MjModel.from_xml_string(text)
+    force, data = np.empty_like(position), mujoco.MjData(model)
+    for i, rate in enumerate(acceleration):
+        data.qpos[:], data.qvel[:], data.qacc[:] = position[i], speed[i], rate
+        mujoco.mj_inverse(model, data)
+        force[i] = data.qfrc_inverse
+    return force
 
 
 def parts(time, position, force, model=ARM):
@@ -177,8 +184,8 @@ def test_an_explanation_tells_what_was_looked_at(motion):
     assert [row["check"] for row in document["sanity"] if row["wrong"]] == ["position_zero"]
     turned = dataclasses.replace(recording, position=-recording.position)
     assert (
-        sanity.looked_at(turned, Mujoco(ARM, "elbow"), None).wrong is None
-    )  # one joint: no telling
+        "elbow counts the other way" in sanity.looked_at(turned, Mujoco(ARM, "elbow"), None).wrong
+    )
 
 
 @pytest.mark.slow
@@ -192,3 +199,19 @@ def test_the_command_names_the_columns_to_swap(motion, tmp_path, capsys):
     assert cli.main(["explain", str(tmp_path / "log.csv"), *options]) == 0
     assert "the columns are permuted" in " ".join(capsys.readouterr().out.split())
     assert "Looked at before any physics" in (tmp_path / "out_elbow.html").read_text()
+
+
+@pytest.mark.slow
+def test_a_payload_picked_up_is_mass_of_the_last_body_from_its_moment_on(motion):
+    time, position, force = motion
+    speed = np.gradient(position, time, axis=0)
+    acceleration = np.gradient(np.gradient(position, time, axis=0), time, axis=0)
+    heavier = ARM.replace('mass="1.2"', 'mass="1.8"')
+    more = [needed(text, position, speed, acceleration) for text in (ARM, heavier)]
+    carried = force + np.where(time[:, None] > 6, more[1] - more[0], 0)
+    found = explain(parts(time, position, carried)[1].recording, Mujoco(ARM, "elbow"))
+    (finding,) = found.findings
+    assert finding.effect == "payload_change" and "the mass of body forearm" in finding.sentence
+    moment, mass = (finding.parameters[n] for n in ("step_time", "payload_body/forearm/mass"))
+    assert float(moment.value) == pytest.approx(6.0, abs=0.2)
+    assert float(mass.value) == pytest.approx(0.6, abs=0.02)

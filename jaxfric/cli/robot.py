@@ -277,16 +277,10 @@ def _severe(told: Explanation) -> list[str]:
     return [each["text"] for each in told.warnings if each["severe"]]
 
 
-# Findings that are put right before any physics, and say so in a sentence.
-LOOKED_AT = ("position_zero", "clock", "force_limit")
-
-
 def _said(finding) -> str:
-    if finding.effect in LOOKED_AT:
-        return finding.sentence
     if finding.effect == "parameter_mismatch":
         return finding.sentence.removeprefix("Wrong in the simulator: ").rpartition("; ")[0]
-    return finding.effect.replace("_", " ")
+    return finding.sentence
 
 
 def _written(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict[str, str]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from .. import programs, signals
 from ..data.recording import Recording, pad
-from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, channels_of
+from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
 from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
 
@@ -100,7 +100,7 @@ class Evidence(NamedTuple):
     def _known(self, term: KnownColumns) -> np.ndarray:
         """Rows of what a simulator says its parameters add, `(J, p)`."""
         channels = self.motion.channels
-        pairs = [channels_of(i) for i in range(len(term.names))]
+        pairs = term.channels
         plain, momentum = (
             np.stack([channels[n] for n in some]) for some in zip(*pairs, strict=True)
         )

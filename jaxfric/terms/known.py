@@ -75,11 +75,18 @@ class KnownColumns(AbstractLaw):
     """What a simulator's own parameters add where they are others: u = Σ Δθ_i ∂f_known/∂θ_i.
 
     **Arguments:** `names` of the parameters, and their units as they are `spelled`. Recordings
-    bring the derivatives as the channels of `channels_of`, in two parts as the force.
+    bring the derivatives as the channels of `channels_of`, in two parts as the force, from the
+    number `first` on.
     """
 
     names: tuple[str, ...] = eqx.field(static=True, converter=tuple)
     spelled: tuple[str, ...] = eqx.field(static=True, converter=tuple)
+    first: int = eqx.field(static=True, default=0)
+
+    @property
+    def channels(self) -> tuple[tuple[str, str], ...]:
+        """The channels of each parameter, the rest and what is differentiated."""
+        return tuple(channels_of(self.first + i) for i in range(len(self.names)))
 
     @property
     def affine(self):
@@ -88,13 +95,13 @@ class KnownColumns(AbstractLaw):
 
     @property
     def coordinates(self):
-        return frozenset(name for i in range(len(self.names)) for name in channels_of(i))
+        return frozenset(name for pair in self.channels for name in pair)
 
     def law(self, sample: Sample):
-        return tuple(reading(sample, channels_of(i)[0]) for i in range(len(self.names)))
+        return tuple(reading(sample, rest) for rest, _ in self.channels)
 
     def impulse(self, sample: Sample):
-        return tuple(reading(sample, channels_of(i)[1]) for i in range(len(self.names)))
+        return tuple(reading(sample, momentum) for _, momentum in self.channels)
 
 
 def channels_of(number: int) -> tuple[str, str]:

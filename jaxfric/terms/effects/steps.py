@@ -5,10 +5,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..base import AbstractTerm, Sum
+from ..base import AbstractTerm, Sum, summands
 from ..effect import GRID, Effect, Extent, View, even
 from ..friction import Coulomb
 from ..inertia import Inertia
+from ..known import KnownColumns
 from ..position import Gravity
 from ..sample import Scales
 from ..time import FrictionStep, GainStep, PayloadChange
@@ -46,7 +47,15 @@ FRICTION_STEP = Effect(
 
 
 def hanging(term: PayloadChange, base: AbstractTerm, turn: float | None) -> AbstractTerm:
-    """On a turning axis the load's weight goes with the angle."""
+    """On a turning axis the load's weight goes with the angle; of another simulator's axis it is
+    more mass of the last body, which has the load's place.
+    """
+    for part in summands(base):
+        masses = [i for i, n in enumerate(getattr(part, "names", ())) if n.endswith("/mass")]
+        if isinstance(part, KnownColumns) and masses:
+            last = masses[-1]
+            load = KnownColumns((part.names[last],), (part.spelled[last],), part.first + last)
+            return dataclasses.replace(term, load=load)
     if turn is None:
         return term
     return dataclasses.replace(term, load=Sum((Inertia(), Gravity(turn))))
@@ -54,13 +63,17 @@ def hanging(term: PayloadChange, base: AbstractTerm, turn: float | None) -> Abst
 
 def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
     """The sentence with the load's weight, where it has one."""
+    mass = next((name for name in values if name.endswith("/mass")), None)
+    if mass is not None:
+        body = mass.split("/")[1]
+        return f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}: {PICKED}"
     weight = next((name for name in ("amplitude", "payload_offset") if name in values), None)
     if weight is None:
         return None
-    return (
-        f"{PAYLOAD_CHANGE.sentence}, and its weight by {{{weight}}}: something was picked up or "
-        "put down"
-    )
+    return f"{PAYLOAD_CHANGE.sentence}, and its weight by {{{weight}}}: {PICKED}"
+
+
+PICKED = "something was picked up or put down"
 
 
 PAYLOAD_CHANGE = Effect(
