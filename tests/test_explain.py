@@ -140,6 +140,7 @@ def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
     assert errors["after"] < 0.8 * errors["before"]
 
 
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_units_time_or_direction(healthy):
     term, alpha, beta = CASES["cogging"]
     run = planted(healthy[0], term, alpha, beta)
@@ -169,6 +170,7 @@ def test_a_wrong_value_is_told_from_missing_physics(healthy):
     assert right.verdict == "consistent"
 
 
+@pytest.mark.slow
 def test_values_that_are_right_stay_as_given_and_findings_are_still_verified(healthy):
     model = models.from_parameters(models.gaussian(), PARAMETERS)
     first, second = (planted(run, *CASES["cogging"]) for run in healthy)
@@ -351,6 +353,7 @@ def test_a_tone_returns_in_another_recording_at_any_phase(healthy):
     assert after == pytest.approx(before, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_filtered_velocity_without_a_position_is_said_to_look_like_a_delay(healthy):
     """Four milliseconds of a first-order filter on the velocity, as drives log it."""
     position = np.asarray(healthy[0].position)
@@ -424,6 +427,7 @@ def test_the_map_shows_what_is_in_step_with_acceleration(healthy):
     assert not np.allclose(plain["before"], np.sin(30 * np.asarray(plain["at"])), atol=0.4)
 
 
+@pytest.mark.slow
 def test_values_that_do_not_carry_over_are_said_to(healthy):
     """Where an axis never goes slowly, nothing is missing, but its Stribeck bump is not known."""
     speed = np.abs(set_point(0)[1])
@@ -1031,6 +1035,7 @@ def test_a_weak_later_term_is_asked_for_a_part_of_the_rest_elsewhere(monkeypatch
         assert naming.least_gain(*effects, 1000.0, 3.0, part) == pytest.approx(least)
 
 
+@pytest.mark.slow
 def test_two_stops_for_one_that_stiffens_add_up_and_are_two_terms(healthy):
     """A Hertzian contact, F ∝ depth^1.5, which no single stop of the library is."""
     high = float(np.quantile(np.asarray(healthy[0].position), 0.75))

@@ -51,6 +51,6 @@ def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
 def test_a_session_over_recordings_of_any_length_stays_bounded():
     lengths = {
         uniform(jf.Recording(np.arange(n), np.zeros(n), np.zeros(n))).num_samples
-        for n in np.geomspace(2, 500_000, 500).astype(int)
+        for n in np.geomspace(2, 500_000, 100).astype(int)
     }
     assert len(lengths) < 20

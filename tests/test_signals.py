@@ -207,6 +207,7 @@ def trapezoid(top, seconds, rng):
     return position, velocity
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     st.sampled_from([multisine, chirp, trapezoid]),
@@ -236,6 +237,7 @@ def test_the_velocity_is_within_a_hundredth_or_it_is_said(kind, rate, cycle, cou
     assert error < 6 * max(choice.error / size_of_motion, 0.002), (error, choice)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 def test_the_width_is_chosen_in_a_second_at_fifty_kilohertz(jitter):
     rng = np.random.default_rng(0)
@@ -389,3 +391,26 @@ def test_a_quantile_follows_the_values_it_lies_between():
     middle = np.isin(values, [500, 501])
     np.testing.assert_allclose(slope, 0.5 * middle)
     assert np.isnan(signals.quantile(jnp.full(7, jnp.nan), 0.5))
+
+
+@pytest.mark.parametrize("kind", ["plain", "position", "bad", "single", "nothing"])
+def test_magnitudes_on_the_host_are_those_of_a_program(kind):
+    draw = np.random.default_rng(3)
+    time = np.cumsum(draw.uniform(0.9e-3, 1.1e-3, 700))
+    velocity = np.round(np.sin(9 * time) + 1e-3 * draw.normal(size=time.size), 3)
+    position = np.cumsum(velocity) * 1e-3 if kind == "position" else None
+    mask = np.full(time.size, kind != "nothing")
+    segment = (time > time[400]).astype(np.int32)
+    if kind == "bad":
+        mask[650:], velocity[650:], velocity[20] = False, 7.0, np.nan
+    if kind == "single":
+        time, velocity = np.float32(time), np.float32(velocity)
+    log = jf.Recording(time, 3 * velocity, position, velocity, mask=mask, segment=segment)
+    found, noise = signals.host_scales(log)
+    expected = signals.scales(log)
+    tolerance = 2e-5 if kind == "single" else 1e-12
+    for ours, theirs in zip(found, expected, strict=True):
+        assert ours.dtype == theirs.dtype
+        np.testing.assert_allclose(ours, theirs, rtol=tolerance)
+    theirs = signals.velocity_noise(log, expected.interval)
+    np.testing.assert_allclose(noise, theirs, rtol=tolerance)

@@ -210,7 +210,7 @@ def gather(
     count = recording.num_samples
     prepared, smoothed = lengthened(recording)
     width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
-    limits = Scales(*(float(x) for x in _scales(_without_known(prepared))))
+    limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
     reach = step * NODES * limits.interval
@@ -271,8 +271,6 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
     return dataclasses.replace(padded, channels=whole.channels), smoothed
 
-
-_scales = programs.compiled(signals.scales)
 
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
 # axis hardly accelerates, the noise of its acceleration would ask for wider ones.

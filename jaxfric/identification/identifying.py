@@ -110,18 +110,19 @@ solve_rows = programs.compiled(_solve_rows)
 
 
 class _Sought(NamedTuple):
-    """What the nonlinear parameters were sought in, and what was found."""
+    """What the nonlinear parameters were sought in, and what was found; the velocity's noise."""
 
     limits: Scales
+    noise: Float[Array, ""]
     rows: Rows
     found: Found
 
 
 @programs.compiled
-def _seek(term, recording, projection, width, given, grid) -> _Sought:
+def _seek(magnitudes, term, recording, projection, width, given, grid) -> _Sought:
     """The nonlinear parameters."""
     recording = _sanitised(recording)
-    limits = signals.scales(recording)
+    limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
     rows = projection.rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
     box = term_bounds(
@@ -129,7 +130,7 @@ def _seek(term, recording, projection, width, given, grid) -> _Sought:
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    return _Sought(limits, rows, search(active, recording, rows, box, grid, alike))
+    return _Sought(limits, noise, rows, search(active, recording, rows, box, grid, alike))
 
 
 @programs.compiled
@@ -137,7 +138,7 @@ def _judge(
     sought: _Sought, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
     """All parameters and what is known about them, from the nonlinear ones."""
-    limits, rows, best = sought
+    limits, noise, rows, best = sought
     beta, converged, border, alpha = best[:4]
     finite = _finite(recording)
     recording = _sanitised(recording)
@@ -158,7 +159,6 @@ def _judge(
     model = Model(
         term.with_beta(known[alpha.size :].astype(beta.dtype)), known[: alpha.size], recording.units
     )
-    noise = signals.velocity_noise(recording, limits.interval)
     slipping = limits.fastest > signals.SLIP_DEVIATIONS * noise
     hidden = jnp.any(jnp.isinf(jnp.diagonal(matrix)))
     rival = jnp.full_like(beta, jnp.nan) if best.rival is None else best.rival
@@ -252,8 +252,20 @@ def _outside(rival, beta, matrix) -> Bool[Array, ""]:
 
 
 def _identify(*question) -> tuple[Identified, Design]:
-    """What a [`Question`][] about one recording asks, in two programs."""
-    return _judge(_seek(*question), *question)
+    """What a [`Question`][] about one recording asks, in two programs.
+
+    What is found once in a recording is found on the host, where it needs no compiling.
+    """
+    recording = question[1]
+    magnitudes = None
+    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(question)):
+        magnitudes = signals.host_scales(_sanitised(jax.tree.map(np.asarray, recording), np))
+    return _judge(_seek(magnitudes, *question), *question)
+
+
+def _magnitudes(recording: Recording) -> tuple[Scales, Float[Array, ""]]:
+    limits = signals.scales(recording)
+    return limits, signals.velocity_noise(recording, limits.interval)
 
 
 class _Judged(NamedTuple):
@@ -337,16 +349,19 @@ def _finite(recording: Recording) -> Bool[Array, ""]:
     return jnp.all(jnp.stack(good))
 
 
-def _sanitised(recording: Recording) -> Recording:
-    """Zeros for what is not finite, so that one bad sample cannot spoil sums or gradients."""
+def _sanitised(recording: Recording, of=jnp) -> Recording:
+    """Zeros for what is not finite, so that one bad sample cannot spoil sums or gradients.
+
+    `of`: the arrays' module, `numpy` on the host.
+    """
 
     def clean(x):
         inexact = jnp.issubdtype(x.dtype, jnp.inexact)
-        return jnp.where(jnp.isfinite(x), x, 0.0) if inexact else x
+        return of.where(of.isfinite(x), x, x.dtype.type(0)) if inexact else x
 
     usable = recording.mask
     for signal in (recording.force, recording.velocity, recording.time):
-        usable = usable & jnp.isfinite(signal)
+        usable = usable & of.isfinite(signal)
     return eqx.tree_at(lambda r: r.mask, jax.tree.map(clean, recording), usable)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from .. import programs, signals
+from .. import signals
 from ..data.recording import Recording, described
 from ..models import Model, named
 from ..terms.base import AbstractTerm
@@ -54,10 +54,6 @@ def ask(
     return Question(term, prepared, chosen, width, limits, plan)
 
 
-# Scales of a recording on the host.
-_scales = programs.compiled(signals.scales)
-
-
 def _plan(term, recording, projection, given) -> grids.Plan | None:
     """The grids of a term that needs its own; the usual ones where the recording is traced."""
     if not blocks.staged(term):
@@ -66,9 +62,10 @@ def _plan(term, recording, projection, given) -> grids.Plan | None:
     if signals.is_traced(recording):
         return grids.plan(term, given, None, width)
     if recording.time.ndim == 1:
-        return grids.plan(term, given, _scales(recording), width)
+        return grids.plan(term, given, signals.host_scales(recording)[0], width)
     count = recording.time.shape[0]
-    rows = [_scales(jax.tree.map(lambda x, i=i: x[i], recording)) for i in range(count)]
+    each = (jax.tree.map(lambda x, i=i: x[i], recording) for i in range(count))
+    rows = [signals.host_scales(row)[0] for row in each]
     return grids.plan(term, given, jax.tree.map(lambda *x: np.stack(x), *rows), width)
 
 

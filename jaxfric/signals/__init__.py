@@ -13,6 +13,7 @@ from .motion import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     SLIP_SHARE as SLIP_SHARE,
     counter_velocity as counter_velocity,
+    host_scales as host_scales,
     kernel_half_width as kernel_half_width,
     prepare as prepare,
     scales as scales,

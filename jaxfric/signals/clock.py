@@ -35,7 +35,8 @@ def _linked(recording: Recording) -> Bool[Array, " M"]:
 
 def host_interval(recording: Recording) -> float:
     """[`interval`][] of a recording that is not traced, on the host; NaN without valid steps."""
-    steps = np.diff(np.asarray(recording.time, float))[np.asarray(_linked_on_host(recording))]
+    steps = np.diff(np.asarray(recording.time, float))[_linked_on_host(recording)]
+    steps = steps[~np.isnan(steps)]
     return float(np.median(steps)) if steps.size else float("nan")
 
 

@@ -1,18 +1,23 @@
 """The motion of a recording: its velocity, its magnitudes, and what counts as slip."""
 
 import dataclasses
+from collections.abc import Callable
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .. import programs
 from ..data.recording import Recording
 from ..terms.sample import Scales
 from . import polynomial
-from .clock import continuous, interval, is_traced, quantile
-from .parabolas import TRACED_REACH, choose_half_width, local_quadratic, white_noise
+from .clock import host_continuous, host_interval, interval, is_traced, quantile
+from .parabolas import (
+    TRACED_REACH,
+    choose_half_width,
+    host_white_noise,
+    local_quadratic,
+    white_noise,
+)
 from .polynomial import HALF_WIDTHS, Choice, weights
 
 # Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
@@ -67,6 +72,29 @@ def scales(recording: Recording) -> Scales:
     return Scales(slowest, fastest, low, high, force, start, end - start, typical)
 
 
+def host_scales(recording: Recording) -> tuple[Scales, np.ndarray]:
+    """[`scales`][] and [`velocity_noise`][] of a recording that is not traced, on the host."""
+    valid, velocity = np.asarray(recording.mask), np.asarray(recording.velocity)
+    typical = host_interval(recording)
+    noise = host_white_noise(velocity, host_continuous(recording, typical))
+    fastest = _of_numbers(np.abs(velocity[valid]), lambda speed: np.quantile(speed, 0.98))
+    slowest = np.maximum(SLIP_DEVIATIONS * noise, SLIP_SHARE * fastest)
+    place = velocity if recording.position is None else np.asarray(recording.position)
+    low, high = (_of_numbers(place[valid], end) for end in (np.min, np.max))
+    start, end = (_of_numbers(np.asarray(recording.time)[valid], end) for end in (np.min, np.max))
+    square = np.sum(np.asarray(recording.force)[valid] ** 2)
+    force = np.sqrt(square / max(np.count_nonzero(valid), 1))
+    found = (slowest, fastest, low, high, force, start, end - start, typical, noise)
+    *magnitudes, deviation = (np.asarray(each, velocity.dtype) for each in found)
+    return Scales(*magnitudes), deviation
+
+
+def _of_numbers(values: np.ndarray, what: Callable[[np.ndarray], float]) -> float:
+    """A property of the values that are numbers; NaN where there are none."""
+    numbers = values[~np.isnan(values)]
+    return what(numbers) if numbers.size else np.nan
+
+
 def counter_velocity(
     counts: Float[Array, " N"], clock: Float[Array, " N"], resolution: float, tick: float = 1.0
 ) -> Float[Array, " N"]:
@@ -86,14 +114,6 @@ def counter_velocity(
     return velocity.at[0].set(velocity[1])
 
 
-@programs.compiled
-def _host_facts(recording):
-    limits, position = scales(recording), recording.position
-    typical = limits.interval
-    jitter = jnp.zeros(()) if position is None else white_noise(recording, position, typical)
-    return limits, velocity_noise(recording, typical), jitter, continuous(recording, typical)
-
-
 def kernel_half_width(recording: Recording) -> int:
     """Half-width, in samples, of the weak form's kernel for a prepared recording.
 
@@ -106,7 +126,10 @@ def kernel_half_width(recording: Recording) -> int:
     if is_traced(recording):
         return 24
     velocity = np.nan_to_num(np.asarray(recording.velocity, float))
-    limits, noise, jitter, linked = jax.tree.map(np.asarray, _host_facts(recording))
+    limits, noise = host_scales(recording)
+    linked = host_continuous(recording, float(limits.interval))
+    position = recording.position
+    jitter = 0.0 if position is None else host_white_noise(np.asarray(position), linked)
     slipping = velocity[np.abs(velocity) > limits.slowest]
     stretches = int(np.count_nonzero(np.diff(np.sign(slipping)))) + (recording.num_segments or 1)
     longest = int(np.count_nonzero(recording.mask)) // stretches // 8

@@ -102,6 +102,19 @@ def _by_differences(signal, together, order: int) -> Float[Array, ""]:
     return mean * np.sqrt(np.pi / 2 / comb(2 * order, order)).astype(signal.dtype)
 
 
+def host_white_noise(signal: np.ndarray, together: np.ndarray) -> float:
+    """[`white_noise`][] on the host; `together`, `(N - 1,)`: samples that belong together."""
+    fourth, eighth = (_host_differences(signal, together, order) for order in (4, 8))
+    return eighth if eighth < 0.5 * fourth else fourth
+
+
+def _host_differences(signal: np.ndarray, together: np.ndarray, order: int) -> float:
+    broken = np.pad(np.cumsum(~together), (1, 0))
+    used = (broken[order:] == broken[:-order]) & (signal[order:] != signal[:-order])
+    mean = np.sum(np.abs(np.diff(signal, order)), where=used) / max(np.count_nonzero(used), 1)
+    return float(mean * np.sqrt(np.pi / 2 / comb(2 * order, order)))
+
+
 def _ladder(size: int, reach: int) -> tuple[int, ...]:
     """The half-widths that a record of that many samples can carry: an eighth of it at most."""
     return tuple(k for k in HALF_WIDTHS if k <= min(reach, max(2, size // 8)))

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .. import checks, programs, signals
+from .. import checks, signals
 from ..data.recording import Recording, require, uniform
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
@@ -125,7 +125,7 @@ def in_motion(recording: Recording, delay: float = 0.0) -> Bool[np.ndarray, " N"
     """
     prepared = signals.prepare(uniform(recording))
     speed = np.abs(np.asarray(prepared.velocity))[: recording.num_samples]
-    moving = speed > float(_scales(prepared).slowest)
+    moving = speed > float(signals.host_scales(prepared)[0].slowest)
     moving &= np.asarray(recording.mask)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
@@ -144,9 +144,6 @@ def delay_of(model: Model) -> float:
     """The dead time of a model, s; zero where it has none."""
     delay = _at_once(model)[1]
     return 0.0 if delay is None else float(delay)
-
-
-_scales = programs.compiled(signals.scales)
 
 
 def residual(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
