@@ -24,7 +24,8 @@ NAMES = {
     "实际位置 [mm]|位置反馈|当前位置|現在位置[mm]|実位置|モータ位置|ﾓｰﾀ位置",
     "velocity": "Drehzahlistwert [U/min]|Istgeschwindigkeit|Motordrehzahl|vitesse réelle|"
     "实际速度 [rad/s]|转速|电机速度|回転速度 [r/min]|モーター速度",
-    "force": "Motorstrom [A]|Drehmomentistwert|Istmoment|Kraft [N]|couple mesuré (Nm)|courant|"
+    "force": "Motorstrom [A]|Antriebskraft [N]|Antriebsmoment|Drehmomentistwert|Istmoment|"
+    "Kraft [N]|couple mesuré (Nm)|courant|"
     "实际转矩|电机电流（A）|扭矩 [N·m]|トルク [N·m]|モータ電流|推力",
     "reference": "Sollposition|Lagesollwert|consigne de position|位置指令|目标位置|"
     "指令位置|目標位置",

@@ -22,7 +22,7 @@ _WORDS = {
     "actual": "ist istwert mesure mesuree reel reelle 实际 實際 实测 反馈 当前 "
     "実 実際 実測 現在 測定 フィードバック",
     "setpoint": "soll sollwert vorgabe consigne 指令 命令 目标 目標 设定 設定 给定 期望 参考",
-    "motor": "motor moteur 电机 電機 モータ モーター",
+    "motor": "motor antrieb antriebs moteur 电机 電機 モータ モーター",
     "axis": "achse axe 轴 軸",
     "joint": "gelenk 关节 関節",
     "": "wert s valeur 值 値",
