@@ -76,6 +76,7 @@ WORDS = [
     "explain GOOD --baseline absent.json",
     "explain GOOD --baseline GOOD",
     "explain GOOD --holdout absent.csv",
+    "explain GOOD --holdout GOOD",
     "explain GOOD --joint elbow",
     "explain GOOD --simulation-holdout GOOD",
     "explain GOOD --mujoco absent.xml",

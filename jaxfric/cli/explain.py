@@ -4,6 +4,8 @@ import dataclasses
 from argparse import Namespace
 from pathlib import Path
 
+import numpy as np
+
 from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
 from ..explanation import Earlier, Explanation, explain
@@ -33,6 +35,11 @@ def run(arguments: Namespace) -> int:
     holdout = None
     if arguments.holdout:
         holdout, more = _beside(arguments.holdout, recording, arguments)
+        if _same(recording, holdout):
+            raise ValueError(
+                f"--holdout {arguments.holdout}: these are the samples of {arguments.file} itself, "
+                "which cannot judge what was fitted to them. Give another recording, or none."
+            )
         notes = notes + [f"Held out: {note}" for note in more if note != notes[0]]
     baseline = _baseline(arguments, recording, holdout)
     try:
@@ -64,6 +71,12 @@ def run(arguments: Namespace) -> int:
     if not any(standard(path) for path in texts):
         say(tabulate.explanation(document))
     return 0
+
+
+def _same(ours: Recording, theirs: Recording) -> bool:
+    """Whether two recordings hold the same force at the same times, whatever their files."""
+    pairs = ((ours.time, theirs.time), (ours.force, theirs.force))
+    return all(np.array_equal(mine, other, equal_nan=True) for mine, other in pairs)
 
 
 def _per_pole_pair(found: Explanation, document: dict, pairs: int) -> None:
