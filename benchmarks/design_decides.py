@@ -58,6 +58,7 @@ def machine(rng, effect):
     }  # fmt: skip
     term, alpha = drawn[effect]()
     bent = {
+        "hardening_spring": [0.0],
         "gravity_unbalance": [rng.uniform(3, 6) * reach],
         "cogging": [rng.uniform(0.005, 0.02)],
         "periodic_disturbance": [rng.uniform(3.0, 8.0)],
@@ -118,10 +119,10 @@ def along(motion):
     return jf.Recording(motion.time, 0 * motion.time, position=motion.position)
 
 
-def case(seed):
-    """One drawn axis; `None` where nothing is confusable or the truth is not among it."""
+def case(seed, effects=EFFECTS):
+    """One drawn axis; no case where nothing is confusable or the truth is not among it."""
     rng = np.random.default_rng(seed)
-    effect = EFFECTS[int(rng.integers(len(EFFECTS)))]
+    effect = effects[int(rng.integers(len(effects)))]
     model = machine(rng, effect)
     first = unlucky(rng, effect)
     log = recorded(model, first, seed)
@@ -175,6 +176,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--effects", nargs="+", default=EFFECTS, choices=EFFECTS)
     parser.add_argument("--out", type=Path, default=Path("decides.json"))
     arguments = parser.parse_args()
     # What an interrupted run has written stays.
@@ -184,7 +186,7 @@ def main():
         if seed % FRESH == 0:  # each structure is a program: the process runs out of memory maps
             jax.clear_caches()
         try:
-            one = case(seed)
+            one = case(seed, arguments.effects)
         except ValueError as error:
             one = {"seed": seed, "case": False, "error": str(error)}
         seen.append(one)

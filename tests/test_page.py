@@ -265,6 +265,16 @@ def test_friction_is_not_drawn_where_nothing_was_seen():
     assert chart["data"][0] == [0, 0.1, 0.2] and chart["data"][1][0] is None
 
 
+def test_mean_forces_at_constant_velocity_stand_beside_the_friction_curve():
+    held = [{"velocity": 0.15, "force": 1.6, "half": 0.2}]
+    friction = {"velocity": [0.1, 0.2], "before": [1.0, 2.0], "after": [1, 2], "held": held}
+    text = page.render(DOCUMENT, curves() | {"friction": friction})
+    chart = next(each for each in drawn(text) if each["title"] == "Friction over velocity")
+    assert chart["data"][0] == [0, 0.1, 0.15, 0.2]
+    assert chart["series"][-1]["label"].startswith("mean at constant velocity")
+    assert [column[2] for column in chart["data"][-3:]] == pytest.approx([1.6, 1.4, 1.8])
+
+
 def test_an_unseen_parameter_is_no_number():
     rows = equations.rows(model().with_parameters({"coulomb-": float("nan")}))
     coulomb = next(row for row in rows if row.name == "coulomb")

@@ -3,6 +3,7 @@
 import dataclasses
 from argparse import Namespace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
 from ..explanation.quantities import per_pole_pair
 from ..identification import documents, tabulate
+from ..identification.constant_velocity import held
 from ..identification.uncertainty import Estimate
 from ..models import Model, load, named
 from ..report import page
@@ -98,8 +100,21 @@ def written(
     if arguments.save:
         texts[arguments.save] = documents.to_json(documents.saved(found.model, *recordings))
     if arguments.report:
-        texts[arguments.report] = page.render(document, found.curves, arguments.typed, today())
+        curves = _with_held(found, recordings[0])
+        texts[arguments.report] = page.render(document, curves, arguments.typed, today())
     return texts
+
+
+def _with_held(found: Explanation, recording: Recording) -> dict[str, Any]:
+    """The curves of the page with the mean forces at constant velocity (`constant_velocity`).
+
+    Not where a term reads what the recording lacks.
+    """
+    friction = found.curves.get("friction")
+    known = {"time", "position", "velocity", "acceleration", *recording.channels}
+    if not friction or not friction["velocity"] or not found.model.term.coordinates <= known:
+        return found.curves
+    return found.curves | {"friction": friction | {"held": held(recording, found.model)}}
 
 
 def _simulation(

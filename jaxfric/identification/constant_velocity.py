@@ -7,6 +7,7 @@ the recording that was identified the fit saw the same samples, so another one i
 """
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import jax
@@ -118,14 +119,26 @@ def constant_velocity(recording: Recording, found: Any = None) -> ConstantVeloci
     require(recording, "constant_velocity")
     if signals.is_traced(recording):
         raise ValueError("constant_velocity reads values: call it outside of jax.jit.")
+    log, stretches, points = _points(recording, found)
+    points = _compared(points, found)
+    return ConstantVelocity(tuple(points), tuple(_gaps(log, stretches, points, slowest_slip(log))))
+
+
+def held(recording: Recording, model: Model) -> list[dict[str, float]]:
+    """The points of a recording, less what a model says beyond velocity, beside no curve."""
+    points = _points(recording, SimpleNamespace(model=model))[2]
+    return [
+        {"velocity": p.velocity, "force": p.force, "half": 0.5 * (p.high - p.low)} for p in points
+    ]
+
+
+def _points(recording: Recording, found: Any) -> tuple[Recording, list[Stretch], list[Point]]:
+    """The prepared recording, its stretches, and a point for each speed."""
     log = jax.tree.map(np.asarray, signals.prepare(recording))
     force = np.asarray(log.force, float) - beyond(found, log)
-    slowest = slowest_slip(log)
-    stretches = steady(log, force, slowest)
-    groups = _groups(stretches)
+    stretches = steady(log, force, slowest_slip(log))
     mass = _mass(found)
-    points = _compared([_point(group, mass) for group in groups], found)
-    return ConstantVelocity(tuple(points), tuple(_gaps(log, stretches, points, slowest)))
+    return log, stretches, [_point(group, mass) for group in _groups(stretches)]
 
 
 def slowest_slip(log: Recording) -> float:

@@ -152,18 +152,23 @@ def in_time(curves: Curves, force: str) -> list[Chart]:
 
 def friction(curves: Curves, force: str, position: str) -> Chart:
     """The friction curve of the improved model over the speeds that were seen."""
-    at = [*curves["velocity"], 0.0, *(curves.get("at") or ())]
+    held = curves.get("held") or ()
+    seen = curves.get("at") or ()
+    at = [*curves["velocity"], 0.0, *seen, *(each["velocity"] for each in held)]
     order = sorted(range(len(at)), key=lambda i: at[i])
-    modelled, seen = len(curves["velocity"]) + 1, len(curves.get("at") or ())
 
-    def spread(values, before: int, after: int):
+    def spread(values, before: int):
         if not values:
             return None
-        whole = [None] * before + list(values) + [None] * after
+        whole = [None] * before + list(values)
+        whole += [None] * (len(at) - len(whole))
         return [whole[i] for i in order]
 
-    names = ("measured", "error")
-    measured, error = (spread(curves.get(name), modelled, 0) for name in names)
+    modelled = len(curves["velocity"]) + 1
+    measured, error = (spread(curves.get(name), modelled) for name in ("measured", "error"))
+    steady = spread([each["force"] for each in held], modelled + len(seen))
+    # Of bars of two standard errors.
+    half = spread([0.5 * each["half"] for each in held], modelled + len(seen))
     picture = chart(
         "Correction over velocity" if curves.get("corrects") else "Friction over velocity",
         ("velocity", f"{position}/s"),
@@ -171,8 +176,9 @@ def friction(curves: Curves, force: str, position: str) -> Chart:
         [at[i] for i in order],
         [
             points("measured", "measured less all else, ± 95 %", measured, error),
-            line("before", "baseline", spread(curves.get("before"), 0, seen + 1)),
-            line("after", "improved model", spread(curves.get("after"), 0, seen + 1), 2.0),
+            line("before", "baseline", spread(curves.get("before"), 0)),
+            line("after", "improved model", spread(curves.get("after"), 0), 2.0),
+            points("left", "mean at constant velocity, ± 95 %", steady, half),
         ],
         300,
     )
