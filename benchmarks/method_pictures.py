@@ -65,11 +65,11 @@ def turns():
         axes, (("presliding",), ()), ("yields: presliding", "sticks"), strict=True
     ):
         machine = concealed.draw(122, effects, 0.15)
-        motion = question.from_position(concealed.record(machine).recording)
+        motion = evidence.motion_of(concealed.record(machine).recording)
         seen = evidence.gather(motion)
         base = regression.fit([named(machine.baseline)], seen)
         for at, level in reversals.passages(motion, seen, base):
-            way = np.asarray(motion.position)[at]
+            way = np.asarray(motion.recording.position)[at]
             axis.plot(level, 1e6 * (way - way.mean()), lw=0.7)
         axis.set(title=title, xlabel="force, parts of the friction level", xticks=(-0.5, 0, 0.5))
     axes[0].set_ylabel("position, µm")
@@ -81,7 +81,7 @@ def main():
     plt.switch_backend("svg")
     plt.rcParams |= {"svg.fonttype": "none", "font.size": 9, "svg.hashsalt": "jaxfric"}
     machine = concealed.draw(SEED, (EFFECT,), SIZE)
-    asked = question.ask(concealed.record(machine).recording, None, named(machine.baseline))
+    asked = question.ask(concealed.record(machine).recording, named(machine.baseline))
     rows(asked, machine)
     draws(asked)
     turns()

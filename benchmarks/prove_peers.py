@@ -38,7 +38,7 @@ from jaxfric.data.io import write_text
 from jaxfric.explanation import verification
 from jaxfric.explanation.contest import contest
 from jaxfric.explanation.predictions import with_predictions
-from jaxfric.explanation.question import ask, opened
+from jaxfric.explanation.question import ask, beside, opened
 from jaxfric.validation import concealed
 from jaxfric.validation.proof.counting import middle, rate
 from jaxfric.validation.proof.planning import PATTERN
@@ -90,8 +90,8 @@ def judge(sealed, wanted):
     run = concealed.record(machine)
     structure = models.named(machine.baseline)
     recording, holdout = (dataclasses.replace(r, source="") for r in (run.recording, run.holdout))
-    asked = ask(recording, holdout, structure)
-    asked = opened(recording, holdout, asked) or asked
+    asked = ask(recording, structure)
+    asked = beside(opened(recording, asked) or asked, holdout)
     found = {}
     if set(wanted) & set(methods.SELECTING):
         found |= select(asked, recording, [m for m in wanted if m in methods.SELECTING])

@@ -207,10 +207,10 @@ def test_a_clipped_force_makes_no_model_worse(healthy, part):
 def test_a_constant_load_is_no_friction_that_drives(healthy):
     """A weight of 100 N makes a Coulomb level of one direction negative, and no axis of it."""
     lifted = with_force(healthy[0], healthy[0].force + 100.0)
-    asked = question.ask(lifted, None, models.gaussian())
+    asked = question.ask(lifted, models.gaussian())
     assert min(float(a) for a in asked.base.alphas[0]) < -50
     assert not doubts.drives(asked.base, asked.evidence, asked.block)
-    turned = question.ask(with_force(lifted, -lifted.force), None, models.gaussian())
+    turned = question.ask(with_force(lifted, -lifted.force), models.gaussian())
     assert doubts.drives(turned.base, turned.evidence, turned.block)
     assert regression.fast(asked.base) == pytest.approx(regression.fast(turned.base), rel=1e-6)
 

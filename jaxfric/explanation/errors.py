@@ -9,12 +9,12 @@ from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
 from .baseline import at_values
-from .evidence import gather
+from .evidence import gather, motion_of
 from .figures import Figures, cast
 from .improvement import Improved
 from .naming import Named
 from .predictions import with_predictions
-from .question import Question, from_position
+from .question import Question
 from .regression import Fit, fit
 
 
@@ -88,6 +88,6 @@ def _adjusted(better: Improved) -> dict[str, list[str]]:
 def through_kernel(model: Model, recording: Recording, delay: float = 0.0) -> float:
     """A model's force error through the kernel, at its own values; `delay` as `gather` takes it."""
     with jax.enable_x64(True):
-        evidence = gather(from_position(cast(recording)), delay=delay)
+        evidence = gather(motion_of(cast(recording)), delay=delay)
         given = at_values(cast(model), evidence)
     return float(np.sqrt(given.energy / float(evidence.force @ evidence.force)))

@@ -35,6 +35,42 @@ STRIDE = 3
 BATCH, PAIR, STEPPED = 8, 2, 32
 
 
+class Motion(NamedTuple):
+    """A recording whose velocity has been derived, once for all the rows that are made of it.
+
+    `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
+    few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
+    `signals.smoothing`.
+    """
+
+    recording: Recording
+    padded: Recording
+    smoothed: float
+
+    def forced(self, force: Any) -> "Motion":
+        """The same motion with another force, N, `(N,)`."""
+        other = dataclasses.replace(self.recording, force=jnp.asarray(force))
+        longer = pad(other, self.padded.num_samples).force
+        return self._replace(recording=other, padded=dataclasses.replace(self.padded, force=longer))
+
+
+def motion_of(recording: "Recording | Motion") -> Motion:
+    """The motion of a recording by its position, where it has one.
+
+    A recorded velocity is late by its filter, which would look like a delay of the force.
+    """
+    if isinstance(recording, Motion):
+        return recording
+    return _derived(from_position(recording))
+
+
+def from_position(recording: Recording) -> Recording:
+    """A recording without its velocity, where it has a position to derive one from."""
+    if recording.position is None:
+        return recording
+    return dataclasses.replace(recording, velocity=None)
+
+
 class Evidence(NamedTuple):
     """Rows of the weak form in slip, and the motion at the nodes they are made of.
 
@@ -193,29 +229,35 @@ def _static(kind: type) -> frozenset[str]:
 
 
 def gather(
-    recording: Recording,
+    recording: Recording | Motion,
     half_width: int | None = None,
     delay: float = 0.0,
     reversals: bool = False,
+    reach: float | None = None,
 ) -> Evidence:
     """The evidence of one recording.
 
-    **Arguments:** `recording`, signals of shape `(N,)`; `half_width` of the kernel in samples, by
-    default [`kernel_half_width`][jaxfric.signals.kernel_half_width]; `delay`, s, by which the
+    **Arguments:** `recording`, signals of shape `(N,)`, or its motion, with which many rows take
+    little longer than one; `half_width` of the kernel in samples, by
+    default [`kernel_half_width`][jaxfric.signals.kernel_half_width], or as near as samples allow to
+    `reach`, s, that of another recording; `delay`, s, by which the
     force is taken later; `reversals`: rows that reach across a reversal too, but none at rest,
     for judging a model as [`relative_error`][jaxfric.simulation.prediction.relative_error] does.
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
-    count = recording.num_samples
-    prepared, smoothed = lengthened(recording)
-    width = half_width or min(signals.kernel_half_width(prepared), _widest(prepared))
+    motion = recording if isinstance(recording, Motion) else _derived(recording)
+    prepared, count = motion.padded, motion.recording.num_samples
+    source = motion.recording.source or "The recording"
     limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
+    if reach is not None:
+        half_width = max(1, int(round(reach / limits.interval)))
+    width = int(half_width or min(signals.kernel_half_width(prepared), _widest(prepared)))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
-    reach = step * NODES * limits.interval
-    parts = _node_signals(prepared, limits, step, delay, smoothed)
-    index, whole, average, slope = _windows(parts, reach)
+    span = float(step * NODES * limits.interval)
+    parts = _node_signals(prepared, limits, step, delay, motion.smoothed)
+    index, whole, average, slope = _windows(parts, span)
     speed = parts["velocity"][index]
     moving = np.abs(speed) > limits.slowest
     one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
@@ -223,24 +265,24 @@ def gather(
     rows = np.flatnonzero(whole & slips)
     if len(rows) < 32:
         raise ValueError(
-            f"{recording.source or 'The recording'} leaves {len(rows)} independent stretches in "
+            f"{source} leaves {len(rows)} independent stretches in "
             "which the axis slips; at least 32 are needed to tell structure from chance. Record "
             "longer, or move more."
         )
-    motion = _padded(parts, prepared)
+    nodes = _padded(parts, prepared)
     centre = index[rows, NODES]
     force = np.sum(average * parts["force"][index], axis=1)[rows]
-    whole_known = KNOWN_FORCE if KNOWN_MOMENTUM not in recording.channels else KNOWN_REST
+    whole_known = KNOWN_FORCE if KNOWN_MOMENTUM not in prepared.channels else KNOWN_REST
     known = parts.get(f"channel {whole_known}")
     target = force if known is None else force - np.sum(average * known[index], axis=1)[rows]
     average, slope = _averaged(average), _averaged(slope)
     if known is not None and whole_known == KNOWN_REST:
         moving_known = parts[f"channel {KNOWN_MOMENTUM}"]
         target = target - np.sum(slope * moving_known[index], axis=1)[rows]
-    pads = motion.num_samples - len(parts["time"])
+    pads = nodes.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
     return Evidence(
-        motion=motion,
+        motion=nodes,
         nodes=len(parts["time"]),
         average=average,
         slope=slope,
@@ -251,16 +293,13 @@ def gather(
         centre=centre,
         elapsed=np.pad(parts["elapsed"], (0, pads), mode="edge"),
         limits=limits,
-        reach=reach,
+        reach=span,
         width=step * NODES,
         clock=bool(np.all(np.diff(time) > 0)),
     )
 
 
-def lengthened(recording: Recording) -> tuple[Recording, float]:
-    """The recording with its velocity, of one of few lengths, so that few programs are compiled,
-    and by how much that velocity has been smoothed, in samples².
-    """
+def _derived(recording: Recording) -> Motion:
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
     bare = _without_known(nameless)
@@ -269,7 +308,7 @@ def lengthened(recording: Recording) -> tuple[Recording, float]:
     if padded.velocity is None:
         choice = signals.choose(padded)
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
-    return dataclasses.replace(padded, channels=whole.channels), smoothed
+    return Motion(recording, dataclasses.replace(padded, channels=whole.channels), smoothed)
 
 
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an

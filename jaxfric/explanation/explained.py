@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from html import escape
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -65,8 +65,9 @@ class Finding(NamedTuple):
     - `share`: part of the baseline's mean-square residual that it removes; `holdout_share`: the
       same on the held-out recording, `None` without one or where the effect is of the moment.
     - `p_value`: paid for by the number of terms tried.
-    - `attribute`: the simulator's own name for it, where there is one; `instead`: to each wrong
-      value by name, others that this motion cannot tell from it.
+    - `attribute`: the simulator's own name for it, where there is one; `confirmed`: whether the
+      held-out recording bears it out, `None` where it is not asked; `instead`: to each wrong value
+      by name, others that this motion cannot tell from it.
     """
 
     effect: str
@@ -79,6 +80,7 @@ class Finding(NamedTuple):
     holdout_share: float | None
     p_value: float
     attribute: str | None = None
+    confirmed: bool | None = None
     instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
@@ -88,7 +90,9 @@ class Explanation:
 
     - `verdict`: "consistent", "explained", "partly_explained" or "unexplained".
     - `where`: coordinates on which the baseline's residual has structure, the strongest first.
-    - `findings`: the missing physics, the strongest first.
+    - `findings`: the missing physics, the strongest first; `not_confirmed`: what this recording
+      shows and the held-out one does not bear out, which is not in the model. The held-out
+      recording says nothing else: all is looked for and fitted without it.
     - `fit`: force errors before and after, on the recording and on the held-out one.
     - `not_visible`: the smallest size of each other effect that this recording would have shown.
     - `model`: baseline and found terms, for predict, simulate and export.
@@ -122,6 +126,7 @@ class Explanation:
     warnings: list[dict[str, Any]] = dataclasses.field(default_factory=list)
     holdout_model: Model | None = None
     sanity: list[dict[str, Any]] = dataclasses.field(default_factory=list)
+    not_confirmed: list[Finding] = dataclasses.field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """The explanation as plain data (schema `jaxfric.explanation/1`)."""
@@ -141,12 +146,8 @@ class Explanation:
             **({"sanity": self.sanity} if self.sanity else {}),
             "summary": self.summary,
             "where": self.where,
-            "findings": [
-                {**finding._asdict(), "parameters": _estimates(finding.parameters)}
-                | {"confusable_with": list(finding.confusable_with)}
-                | {"instead": {name: list(others) for name, others in finding.instead.items()}}
-                for finding in self.findings
-            ],
+            "findings": _findings(self.findings),
+            "not_confirmed": _findings(self.not_confirmed),
             "fit": self.fit,
             "not_visible": self.not_visible,
             "holdout": self.holdout,
@@ -207,8 +208,17 @@ class Explanation:
         other = [each["text"] for each in self.warnings if each["name"] == "not_better"]
         words = CHANGES if self.baseline_name.startswith("recording") else VERDICTS
         verdict = DOUBTED if severe and not self.findings else words[self.verdict]
-        said = [*severe, verdict, *other, _errors(self.fit, bool(self.findings))]
+        refuted = [_not_confirmed(self.not_confirmed)] if self.not_confirmed else []
+        said = [*severe, verdict, *other, *refuted, _errors(self.fit, bool(self.findings))]
         return " ".join([*said, *_not_determined(self.fit)])
+
+
+def _not_confirmed(findings: Sequence[Finding]) -> str:
+    names = dict.fromkeys(finding.effect.replace("_", " ") for finding in findings)
+    return (
+        f"What looks like {' and '.join(names)} here is not borne out by the held-out recording, "
+        "and is left out of the model."
+    )
 
 
 def _errors(fit: Mapping[str, Any], found: bool) -> str:
@@ -271,6 +281,15 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
 # Other values of the same model leave less than half of a held-out recording's error, a quarter of
 # its power: then most of it is not physics that the model lacks.
 ELSEWHERE = 2.0
+
+
+def _findings(findings: Sequence[Finding]) -> list[dict[str, Any]]:
+    return [
+        {**finding._asdict(), "parameters": _estimates(finding.parameters)}
+        | {"confusable_with": list(finding.confusable_with)}
+        | {"instead": {name: list(others) for name, others in finding.instead.items()}}
+        for finding in findings
+    ]
 
 
 def _estimates(parameters: Mapping[str, Estimate | Moved]) -> dict[str, Any]:

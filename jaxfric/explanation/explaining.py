@@ -1,7 +1,8 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
 import dataclasses
-from collections.abc import Callable, Hashable, Iterator
+import operator
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
@@ -19,21 +20,20 @@ from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from . import parameters as spelled, sanity, threads, verification
 from .attributes import in_own_words
-from .baseline import Baseline, as_given, at_values, baseline_of, mismatch
-from .contest import Contest, contest
+from .baseline import Baseline, Mismatch, as_given, at_values, baseline_of, mismatch
+from .contest import Contest
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
+from .evidence import motion_of
 from .explained import Explanation
 from .figures import Figures, cast
 from .forward import motion_error
-from .improvement import improved
-from .naming import LATER_SHARE, LEAST_OF_BASE, LINEARITY, MOST, OF_BASE, Named, marks, search
-from .predictions import with_predictions
-from .question import ALIGNED, Question, ask, opened
-from .regression import Fit
+from .holdout import check_signals, confirmed
+from .improvement import Rest, improved
+from .naming import Named, search
+from .question import ALIGNED, Question, ask, beside, opened
 from .telling import facts, tell
 from .timing import late, overlooked, settled
-from .views import weightless
 
 
 def explain(
@@ -207,7 +207,11 @@ def _explain(
 ) -> Explanation:
     doing("fitting the baseline")
     known = _known(baseline, seed)
-    asked = ask(recording, holdout, known.structure)
+    motion = motion_of(recording)
+    asked = ask(motion, known.structure)
+    if holdout is not None:
+        there = motion_of(holdout)
+        beside(asked, there)  # says what is wrong with it before anything takes time
     if known.fit is not None:
         known = rephased(known, asked.evidence)
     remarks = [*remarks, *_contradictions(asked)]
@@ -218,23 +222,21 @@ def _explain(
             found = _as_given(known.model, found, asked, ())
         rest = asked, found
     else:
-        doing("looking for what is missing, and whether it holds")
-        asked, found, rest = _found(recording, holdout, known, asked, seed)
+        doing("looking for what is missing")
+        asked, found, rest = _search(motion, known, asked, seed)
         doing("judging the values")
-        there, left = rest
-        if known.model is not None:
-            wrong = mismatch(known.model, left.last, there.evidence, seed)
-        if wrong is not None and known.errors is not None:
-            here = spelled.estimates(left.last, there.block, recording.unit_names)[0]
-            names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
-            wrong = changed(wrong, known, left.last, [float(here[n].standard_error) for n in names])
+        wrong = _wrong(known, rest, recording, seed)
         if known.model is not None and (wrong is not None or fixed):
             free = () if wrong is None else tuple(wrong.moved)
             found = _as_given(known.model, found, asked, free)
-            rest = there, _as_given(known.model, left, there, free)
+            rest = rest[0], _as_given(known.model, rest[1], rest[0], free)
     first = found.base if wrong is None else at_values(known.model, asked.evidence)
     doing("predicting with the improved model")
     better = improved(first, found, rest, asked, figures)
+    if holdout is not None:
+        doing("judging by the held-out recording")
+        check_signals(better.found, recording, holdout)
+        better, asked = confirmed(better, asked, there, figures)
     doing("locating what is left")
     wrong = wrong if better.refitted else None
     explanation = tell(recording, asked, better, known, wrong, figures, remarks, seed)
@@ -244,6 +246,19 @@ def _explain(
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
     return explanation
+
+
+def _wrong(known: Baseline, rest: Rest, recording: Recording, seed: int) -> Mismatch | None:
+    """Which of the baseline's own values are wrong, where it has any."""
+    if known.model is None:
+        return None
+    where, left = rest
+    wrong = mismatch(known.model, left.last, where.evidence, seed)
+    if wrong is None or known.errors is None:
+        return wrong
+    here = spelled.estimates(left.last, where.block, recording.unit_names)[0]
+    names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
+    return changed(wrong, known, left.last, [float(here[n].standard_error) for n in names])
 
 
 def _contradictions(asked: Question) -> list[Remark]:
@@ -260,23 +275,13 @@ def _nothing(asked: Question) -> Named:
     return Named(asked.base, asked.base, [], Contest([], [], float(len(asked.base.residual))))
 
 
-def _found(
-    recording, holdout, known: Baseline, asked: Question, seed: int
-) -> tuple[Question, Named, tuple[Question, Named]]:
-    """The findings, and the question where what they leave is judged, with the findings there."""
-    asked, found = _proved(recording, holdout, known.structure, seed, known=asked)
-    found, rest = _with_the_force_put_back(recording, holdout, known.structure, asked, found, seed)
-    return asked, found, rest
-
-
-def _with_the_force_put_back(
-    recording, holdout, structure, asked: Question, found: Named, seed
-) -> tuple[Named, tuple[Question, Named]]:
+def _search(recording, known: Baseline, asked: Question, seed: int) -> tuple[Question, Named, Rest]:
     """The findings, and the question where what they leave is judged, with the findings there.
 
     To first order a delay is a column; what it leaves of second order would be named too. So where
     the force acts late it is put back, and the search is done once more.
     """
+    asked, found = pursue(recording, known.structure, seed, known=asked)
     lateness = None
     if any(traits(term).late for term in found.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
@@ -284,19 +289,21 @@ def _with_the_force_put_back(
     sure = lateness is not None
     lateness = lateness or overlooked(recording, asked, found, seed)
     if lateness is None:
-        return found, (asked, found)
-    later = None if holdout is None else lateness.undone(holdout)
-    there, behind = _proved(lateness.undone(recording), later, structure, seed, asked)
+        return asked, found, (asked, found)
+    there, behind = pursue(lateness.undone(recording), known.structure, seed, asked)
     both, behind = settled(found, behind, lateness, asked, there)
-    if not sure and later is not None:
-        if _error(behind, there) >= _error(found, asked):
-            return found, (asked, found)
-    return both, (there, behind)
+    errors = (
+        verification.error(*pair)
+        for pair in ((behind.last, there.evidence), (found.last, asked.evidence))
+    )
+    if not sure and operator.ge(*errors):
+        return asked, found, (asked, found)
+    return asked, both, (there, behind)
 
 
 def _known(baseline, seed: int) -> Baseline:
     if isinstance(baseline, Recording):
-        return obeyed(baseline, *pursue(baseline, None, named("gaussian"), seed), seed)
+        return obeyed(baseline, *pursue(baseline, named("gaussian"), seed), seed)
     return baseline_of(baseline)
 
 
@@ -306,180 +313,32 @@ def _as_given(model: Model, found: Named, asked: Question, free: tuple[int, ...]
     return found._replace(base=base, last=last, given=model, free=free)
 
 
-def _proved(
-    recording, holdout, structure, seed, before=None, known: Question | None = None
-) -> tuple[Question, Named]:
-    """The question and the findings that hold on the held-out recording.
-
-    Where one did not, it may hold beside others that hardly show here; or another may account for
-    the same here and hold there, another form of its law, which is looked for first, or another
-    effect. `before`: a question about the same motion; `known`: the question itself, if it has
-    been put.
-    """
-    asked, first = pursue(recording, holdout, structure, seed, before, known)
-    _check_signals(first, recording, holdout)
-    found = _verified(first, asked, seed)
-    ways: list[tuple[frozenset[Hashable], float | None, float]]
-    ways = [(gone, None, 1.0) for gone in _refuted(first, found, asked)]
-    if ways and asked.held is not None:
-        ways.insert(0, (frozenset(), LATER_SHARE, HALVED))
-    for gone, part, enough in ways:
-        again = _sought(asked, seed, gone, first.start, part)
-        _check_signals(again, recording, holdout)
-        again = _verified(again, asked, seed)
-        better = _error(again, asked) < enough * _error(found, asked)
-        if again.names > found.names and better:
-            return asked, again
-    return asked, found
-
-
-# Another motion excites another effect: what is a trifle here may be most of the held-out mismatch,
-# and hide there that another finding holds. So where one is refuted, less is asked of later terms,
-# if with all that then hold there the held-out error is half as large.
-HALVED = 0.5
-
-
-def _refuted(first: Named, found: Named, asked: Question) -> Iterator[frozenset[Hashable]]:
-    """Marks of what did not hold of the first: its forms, where others are; its effects."""
-    names = first.names - found.names
-    gone = [t.trial.candidate for t in first.taken if t.trial.candidate.effect.name in names]
-    forms = frozenset[Hashable]().union(*map(marks, gone)) - names
-    others = [c for c in asked.field.candidates if c.effect.name in names and not marks(c) & forms]
-    if others:
-        yield forms
-    if names:
-        yield names
-
-
-def _check_signals(found: Named, recording, holdout) -> None:
-    """Raise `ValueError` if a finding reads a signal that the held-out recording lacks."""
-    if holdout is None:
-        return
-    ours, theirs = _signals(recording), _signals(holdout)
-    for taken in found.taken:
-        candidate = taken.trial.candidate
-        lacking = (candidate.term.coordinates & ours) - theirs
-        for signal in sorted(lacking):
-            effect = candidate.effect.name.replace("_", " ")
-            raise ValueError(
-                f"{holdout.source or 'The held-out recording'} lacks {signal!r}, by which "
-                f"{recording.source or 'the recording'} shows {effect}, so that this cannot be "
-                "judged there. Add the signal, or explain without a held-out recording."
-            )
-
-
-def _signals(recording: Recording) -> set[str]:
-    """Beside the time, the velocity and the force, which every recording has or gets."""
-    placed = set() if recording.position is None else {"position"}
-    return placed | set(recording.channels)
-
-
 def pursue(
-    recording, holdout, structure, seed, before=None, known: Question | None = None
+    recording, structure, seed, before=None, known: Question | None = None
 ) -> tuple[Question, Named]:
-    """The question, put again if what was found changes how force and motion are aligned."""
-    asked = known or ask(recording, holdout, structure, before=before)
-    asked, found = _searched(recording, holdout, asked, seed)
+    """The question, put again if what was found changes how force and motion are aligned.
+
+    **Arguments:** `before`: a question about the same motion; `known`: the question itself, if it
+    has been put.
+    """
+    recording = motion_of(recording)
+    asked = known or ask(recording, structure, before=before)
+    asked, found = _searched(recording, asked, seed)
     if found.taken:
-        again = ask(recording, holdout, structure, found.last, asked)
+        again = ask(recording, structure, found.last, asked)
         if abs(again.delay - asked.delay) > ALIGNED * asked.evidence.limits.interval:
-            asked, found = _searched(recording, holdout, again, seed)
+            asked, found = _searched(recording, again, seed)
     return asked, found
 
 
-def _searched(recording, holdout, asked: Question, seed) -> tuple[Question, Named]:
+def _searched(recording, asked: Question, seed) -> tuple[Question, Named]:
     """What the rows without reversals show, and then, where they say something, those across.
 
     The latter hold what acts at reversals tenfold, and hide the rest behind what of it no term
     has quite the shape of.
     """
-    found = _sought(asked, seed)
-    across = opened(recording, holdout, asked)
-    return (asked, found) if across is None else (across, _sought(across, seed, start=found))
-
-
-def _sought(
-    asked: Question, seed, refuted: frozenset[Hashable] = frozenset(), start=None, part=None
-) -> Named:
-    judged = asked.held is not None
-    return search(
-        asked.evidence, asked.base, asked.field, asked.wider, seed, refuted, start, judged, part
-    )
-
-
-def _verified(found: Named, asked: Question, seed) -> Named:
-    """Without terms that do not hold: on the held-out recording, or by their own size."""
-    held = found if asked.held is None else _helpful(found, asked)
-    evidence = with_predictions(asked.evidence, held.last)
-    sized = held
-    while (idle := next(weightless(sized, asked), None)) is not None:
-        sized = _lacking(sized, evidence, idle)
-    if len(sized.taken) < len(found.taken):
-        sized = sized._replace(left=contest(evidence, sized.last, asked.field, seed))
-    return sized
-
-
-def _helpful(found: Named, asked: Question) -> Named:
-    """Without terms that do not help on the held-out recording, each beside the others.
-
-    Each is judged without that recording's events, by which it may be far off; all of them together
-    are to be nearer to it than the baseline as it is.
-    """
-    evidence = with_predictions(asked.evidence, found.last)
-    for number in reversed(_lasting(found)):
-        less = verification.lacking(found, evidence, number)
-        place = len(found.last.terms) - len(found.taken) + number
-        if _holds(less, found, asked, found.rephased):
-            continue
-        again = found.rephased | {place}
-        if verification.wavelike(found.last, place) and _holds(less, found, asked, again):
-            taken = [
-                t._replace(rephased=t.rephased or i == number) for i, t in enumerate(found.taken)
-            ]
-            found = found._replace(taken=taken)
-            continue
-        found = _lacking(found, evidence, number)
-    before = verification.error(found.base, asked.held)
-    while _lasting(found) and _error(found, asked) > before:
-        fewer = [_lacking(found, evidence, number) for number in _lasting(found)]
-        found = min(fewer, key=lambda each: _error(each, asked))
-    return found
-
-
-def _lasting(found: Named) -> list[int]:
-    """Numbers of the findings that another recording has to show too."""
-    return [i for i, t in enumerate(found.taken) if not t.trial.candidate.effect.momentary]
-
-
-def _lacking(found: Named, evidence, number: int) -> Named:
-    less = verification.lacking(found, evidence, number)
-    return found._replace(last=less, taken=[t for i, t in enumerate(found.taken) if i != number])
-
-
-def _error(found: Named, asked: Question) -> float:
-    """On the held-out recording, or without one on its own."""
-    judge = asked.evidence if asked.held is None else asked.held
-    return verification.error(found.last, judge, found.rephased)
-
-
-# On the held-out recording a later term has to take the least part of the baseline's mismatch that
-# it may take here, since another motion excites another effect more; or a quarter of what the
-# others leave there, with nothing refitted: what another law leaves does not repeat so well. That
-# is asked of what takes neither 1 % of the baseline's mismatch nor half of the rest here.
-GOOD_PART = 0.25
-
-
-def _holds(less: Fit, found: Named, asked: Question, rephased: frozenset[int]) -> bool:
-    """Whether what `less` lacks helps on the held-out recording; beside others, by how much."""
-    if not verification.helps(less, found.last, asked.held, rephased):
-        return False
-    gained, force = less.energy - found.last.energy, asked.evidence.force
-    faint = gained < LINEARITY**2 * float(force @ force)
-    if len(found.taken) == 1 and not faint:
-        return True
-
-    def part(first: Fit) -> float:
-        return verification.share(less, found.last, first, asked.held, rephased)
-
-    weak = faint or gained < min(OF_BASE * found.base.energy, MOST * less.energy)
-    return (part(found.base) >= LEAST_OF_BASE and not weak) or part(less) >= GOOD_PART
+    found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
+    across = opened(recording, asked)
+    if across is None:
+        return asked, found
+    return across, search(across.evidence, asked.base, across.field, across.wider, seed, found)

@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..data.recording import Recording
+from ..data.recording import Recording, uniform
 from ..models import Model
-from ..simulation.prediction import delay_of, in_motion, relative, residual
+from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual
 
 
 def cast(tree, dtype=float):
@@ -33,6 +33,7 @@ class Figures:
         # Figures that differ by less differ by rounding.
         self.rounding = float(np.sqrt(jnp.finfo(self.dtype).eps))
         self._recordings = {"here": recording, "held": holdout}
+        self._prepared: dict[str, Prepared] = {}
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
 
@@ -60,8 +61,14 @@ class Figures:
         recording = self._recordings[where]
         if (where, delay) not in self._moving:
             with jax.enable_x64(self.x64):
-                self._moving[where, delay] = in_motion(recording, delay)
+                self._moving[where, delay] = in_motion(recording, delay, self._motion(where))
         return self._moving[where, delay], np.asarray(recording.force, float)
+
+    def _motion(self, where: str) -> Prepared:
+        """The recording with its velocity, in the caller's precision; once."""
+        if where not in self._prepared:
+            self._prepared[where] = Prepared(uniform(self._recordings[where]))
+        return self._prepared[where]
 
     def _left(self, model: Model, where: str) -> np.ndarray:
         """What a model leaves of the force, N, `(N,)`; computed once."""
@@ -70,7 +77,7 @@ class Figures:
         key = where, structure, tuple(np.asarray(leaf).tobytes() for leaf in leaves)
         if key not in self._known:
             with jax.enable_x64(self.x64):
-                self._known[key] = residual(self.own(model), recording)
+                self._known[key] = residual(self.own(model), recording, self._motion(where))
         return self._known[key]
 
     def floor(self, model: Model, lag: float) -> float:

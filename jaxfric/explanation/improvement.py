@@ -43,7 +43,9 @@ class Improved(NamedTuple):
     """What is reported: the baseline, the findings that are left, and both models' errors.
 
     `first`: the baseline; `gone`: effects whose findings went, as the model with them is worse;
-    `spoilt`: its errors; `refitted`: whether the baseline's values are others than those given.
+    `spoilt`: its errors; `refitted`: whether the baseline's values are others than those given;
+    `claimed`: the findings that the recording shows, of which the held-out recording does not
+    bear out those of the numbers `refuted`.
     """
 
     first: Fit
@@ -54,14 +56,14 @@ class Improved(NamedTuple):
     after: Errors
     gone: tuple[str, ...] = ()
     spoilt: Errors | None = None
+    claimed: tuple[Named, Rest] | None = None
+    refuted: tuple[int, ...] = ()
 
 
 def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Figures) -> Improved:
     """The findings, without those that make the saved model worse than the baseline `first`.
 
-    By either figure, here or on the held-out recording, over the same samples. Which one goes is
-    decided on the recording itself: the one without which its force error is least. The held-out
-    recording only objects.
+    By either figure, over the same samples. The one goes without which the force error is least.
     """
     units = asked.evidence.motion.units
     base = found._replace(last=first, taken=[])
@@ -69,9 +71,9 @@ def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Fig
     start, spoilt = found, None
     while True:
         delay = delay_of(spelled.model(found.last, units))
-        before = _errors(base, (asked, base), asked, figures, units, delay)
+        before = force_errors(base, (asked, base), asked, figures, units, delay)
         alike = not found.taken and not refitted
-        after = before if alike else _errors(found, rest, asked, figures, units)
+        after = before if alike else force_errors(found, rest, asked, figures, units)
         if not after.worse(before, figures.rounding):
             less = None if spoilt is None else _without_idle(found, rest, asked)
             if less is None:
@@ -82,7 +84,7 @@ def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Fig
         if not found.taken:
             found, rest, refitted = base, (asked, base), False
             continue
-        fewer = (_lacking(found, rest, asked, n) for n in range(len(found.taken)))
+        fewer = (lacking(found, rest, asked, n) for n in range(len(found.taken)))
         found, rest = min(fewer, key=lambda pair: _here(pair[0], figures, units))
     kept = [taken.trial.candidate.effect.name for taken in found.taken]
     names = [taken.trial.candidate.effect.name for taken in start.taken]
@@ -95,7 +97,7 @@ def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Fig
 def _without_idle(found: Named, rest: Rest, asked: Question) -> tuple[Named, Rest] | None:
     """Without a finding that stood beside one that went, and by itself is a trifle."""
     for number in range(len(found.taken)):
-        less, other = _lacking(found, rest, asked, number)
+        less, other = lacking(found, rest, asked, number)
         if 1 - rest[1].last.energy / other[1].last.energy < LEAST_SHARE:
             return less, other
     return None
@@ -129,10 +131,13 @@ def _here(found: Named, figures: Figures, units) -> float:
     return error if np.isfinite(error) else np.inf
 
 
-def _errors(
+def force_errors(
     found: Named, rest: Rest, asked: Question, figures: Figures, units, delay: float | None = None
 ) -> Errors:
-    """`delay`: that of the model whose samples the figures are to be taken over, if another's."""
+    """The force errors of a model, on the held-out recording too where there are rows of it.
+
+    `delay`: that of the model whose samples the figures are to be taken over, if another's.
+    """
     where, left = rest
     filtered = verification.error(left.last, where.evidence)
     here = figures.here(spelled.model(found.last, units), delay)
@@ -142,7 +147,18 @@ def _errors(
     return Errors(here, held, filtered, verification.error(left.last, where.held, left.rephased))
 
 
-def _lacking(found: Named, rest: Rest, asked: Question, number: int) -> tuple[Named, Rest]:
+def beside_others(found: Named, rest: Rest, asked: Question, number: int) -> Fit:
+    """The model without one of the findings, the others refitted.
+
+    Of a force that acts late all that undoing it takes away is its own; the others are refitted
+    with the force put back.
+    """
+    late = number == len(rest[1].taken)
+    place, named = (asked, found) if late else rest
+    return verification.lacking(named, with_predictions(place.evidence, named.last), number)
+
+
+def lacking(found: Named, rest: Rest, asked: Question, number: int) -> tuple[Named, Rest]:
     """The findings without one of them, the others refitted; where the force acts late, too."""
     where, left = rest
     if where is asked or number == len(left.taken):

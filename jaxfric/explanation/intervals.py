@@ -34,3 +34,21 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
     matrix[hidden | (size == 0)] = np.inf
     matrix[:, hidden | (size == 0)] = np.inf
     return matrix
+
+
+def left_out(now: Fit, block: np.ndarray) -> float:
+    """The energy that each block is left with, N², by a fit to all the other blocks.
+
+    To first order in all parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks), each block's
+    pull on the fit bounded as in [`covariance`][].
+
+    **Arguments:** `block`, the number of each row's block, `(J,)`.
+    """
+    basis = now.basis()
+    starts = np.flatnonzero(np.diff(block, prepend=-1))
+    power = 0.0
+    for a, b in zip(starts, [*starts[1:], len(block)], strict=True):
+        own, left = basis[a:b], now.residual[a:b]
+        pull = np.eye(own.shape[1]) - 0.95 * own.T @ own
+        power += float(np.sum((left + own @ np.linalg.solve(pull, own.T @ left)) ** 2))
+    return power

@@ -1,19 +1,21 @@
 """Which physics the residual calls for: the winner of a contest joins, and all are refitted."""
 
 import copy
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import NamedTuple
 
 import jax
 import numpy as np
 
+from ..data.recording import Recording
 from ..models import Model
 from ..terms.effect import Effect
 from .candidates import Candidate, Field
-from .chance import DRAWS, LEVEL
+from .chance import DRAWS, LEVEL, blocks
 from .contest import RIVAL, Contest, Finalist, Trial, contest
-from .evidence import Evidence
-from .plausible import machines
+from .evidence import Evidence, Motion
+from .intervals import left_out
+from .plausible import machines, weightless
 from .predictions import with_predictions
 from .question import BETWEEN, Wider
 from .regression import Fit, fast, fit, without
@@ -26,26 +28,25 @@ LATER_SHARE = 0.05
 MOST_TERMS = 4
 # What comes after stronger terms must also be this part of what the base left, or most of what
 # they leave: no term has quite the shape of what it stands for, and a tenth of its amplitude may
-# stay. No law has the shape of that remainder either, so that it takes the smaller part of it.
+# stay. No law has the shape of that remainder either, so that it takes the smaller part of it: a
+# third is more than what the remainder of one law, another shape, shares with another law.
 # Below a hundredth of the amplitude no force is known to follow its law.
 OF_BASE, LEAST_OF_BASE = 0.01, 1e-4
-MOST = 0.5
-# Where a held-out recording will judge, a third of what they leave is enough to be asked there: the
-# remainder of a law has another shape in another motion, and a force has not. On 60 drawn machines
-# with one effect it let nothing in that was not there.
-MOST_JUDGED = 1 / 3
+MOST = 1 / 3
 
 
 class Taken(NamedTuple):
     """A term that was taken, its rivals, and its p-value.
 
-    `rephased`: whether on the held-out recording its waves only fit with another phase.
+    `rephased`: whether on the held-out recording its waves only fit with another phase;
+    `confirmed`: whether that recording bears it out, `None` where it cannot say.
     """
 
     trial: Trial
     rivals: tuple[str, ...]
     p_value: float
     rephased: bool = False
+    confirmed: bool | None = None
 
 
 class Named(NamedTuple):
@@ -55,7 +56,7 @@ class Named(NamedTuple):
     contest for what remains; `smoothed`: what kernel and sampling make of the time by which the
     force is late, where it is, s; `start`: what rows without reversals had shown, where these reach
     across them; `given`: the base with its own values, where these are kept, but for `free`,
-    numbers of its parameters.
+    numbers of its parameters; `undone`: puts back the force of a recording, where it acts late.
     """
 
     base: Fit
@@ -66,6 +67,7 @@ class Named(NamedTuple):
     start: "Named | None" = None
     given: Model | None = None
     free: tuple[int, ...] = ()
+    undone: Callable[[Recording], Motion] | None = None
 
     @property
     def names(self) -> frozenset[str]:
@@ -85,37 +87,32 @@ def search(
     field: Field,
     wider: Wider = (None, None),
     seed: int = 0,
-    refuted: frozenset[Hashable] = frozenset(),
     start: Named | None = None,
-    judged: bool = False,
-    part: float | None = None,
 ) -> Named:
     """Add terms while they are believed; after each, drop those that have become idle.
 
     **Arguments:** `field`: the candidates; `wider`: the recording through wider kernels, where
-    terms that act on derivatives of the force must show alike; `refuted`: [`marks`][] of what is
-    out of question; `start`: what the rows without reversals have shown, where these reach across
-    them. Then only what acts there is looked for: all else has been, where nothing of that hides
-    it. `judged`: whether a held-out recording will judge what is found; `part` of the rest that is
-    asked of a later term, if another than usual.
+    terms that act on derivatives of the force must show alike; `start`: what the rows without
+    reversals have shown, where these reach across them. Then only what acts there is looked for:
+    all else has been, where nothing of that hides it.
     """
-    part = part or (MOST_JUDGED if judged else MOST)
     now, taken, kept = base, list[Taken](), 0
+    refused = set[Hashable]()
     evidence = with_predictions(evidence, now)
     if start is not None:
         # The base would bend its curve to what acts at reversals; without them it did not.
-        now, taken = _elsewhere(start, refuted)
+        now, taken = _elsewhere(start)
         now = fit(now.terms, with_predictions(evidence, now), now.betas, 0)
         evidence = with_predictions(evidence, now)
         kept = len(taken)
-    visited: set[tuple[str, ...]] = set()
+    visited = set[Hashable]()
     while True:
         round_ = contest(evidence, now, field, seed, lambda e: start is None or e.at_reversals)
-        open_ = [f for f in round_.finalists if not marks(f.trial.candidate) & refuted]
+        open_ = [f for f in round_.finalists if _form(f.trial.candidate) not in refused]
         round_ = machines(round_._replace(finalists=open_), now, evidence)
-        best = _believed(round_, now, evidence, wider, base, taken, judged, part)
+        best = _believed(round_, now, evidence, wider, base, taken)
         # Two terms that make each other idle would take turns for ever.
-        names = tuple(sorted(t.trial.candidate.effect.name for t in taken))
+        names = *sorted(t.trial.candidate.effect.name for t in taken), len(refused)
         if best is None or len(taken) >= MOST_TERMS or names in visited:
             if start is not None and len(taken) == kept:
                 # Nothing there has a name, and the base fits these rows as well as it can.
@@ -131,6 +128,15 @@ def search(
         evidence = with_predictions(evidence, now)
         now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
+        for number in weightless(now, len(taken), evidence, wider[1]):
+            refused.add(_form(taken[number].trial.candidate))
+            now = without(now, evidence, len(now.terms) - len(taken) + number)
+            taken = [t for i, t in enumerate(taken) if i != number]
+
+
+def _form(candidate: Candidate) -> Hashable:
+    """The form of its law."""
+    return jax.tree.structure(candidate.term)
 
 
 def _own(trial: Trial) -> Trial:
@@ -214,8 +220,6 @@ def _force(finalist: Finalist, evidence) -> np.ndarray:
 # The linearity of a good torque or current sensor, relative: a force below it, with respect to the
 # force's root mean square, cannot be told from the sensor whatever its p-value.
 LINEARITY = 2e-3
-# That of the best is half of it; what takes as much off another recording too is of the machine.
-LINEARITY_JUDGED = 1e-3
 
 
 # Sharp terms hold the very noise that they are judged by: none of the draws may be as good.
@@ -235,8 +239,8 @@ NEARLY_ALL = 0.75
 
 
 def _believed(
-    round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken], judged, part: float
-):
+    round_: Contest, now: Fit, evidence, wider, base: Fit, taken: list[Taken]
+) -> Finalist | None:
     least = LATER_SHARE if taken else LEAST_SHARE
     force = float(evidence.force @ evidence.force)
     before = [t.trial.candidate.effect for t in taken]
@@ -244,15 +248,12 @@ def _believed(
         gained = now.energy - finalist.energy
         candidate = finalist.trial.candidate
         effect = candidate.effect
-        # What time alone drives need not come again in another recording, and noise feeds terms on
-        # derivatives there as well.
-        repeats = judged and not (effect.leftover or effect.sharp or effect.momentary)
-        floor = (LINEARITY_JUDGED if repeats else LINEARITY) ** 2 * force
+        floor = LINEARITY**2 * force
         enough = gained >= max(max(least, candidate.least) * now.energy, floor)
         if effect.ubiquitous:
             enough &= gained >= fast(now) ** 2 * len(now.residual)
         if taken:
-            enough &= gained >= least_gain(effect, before, base.energy, now.energy, part)
+            enough &= gained >= least_gain(effect, before, base.energy, now.energy)
             enough &= not _again(finalist, taken)
         level = RAREST if effect.sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
@@ -268,21 +269,19 @@ def least_gain(
     before: Sequence[Effect],
     base: float,
     left: float,
-    part: float = MOST,
     floor: float = LEAST_OF_BASE,
 ) -> float:
     """The energy that a term after others must account for, N².
 
     **Arguments:** `before`: the effects taken already; `base` and `left`: the energy that the base
-    left, and that they leave; `part` of the latter that is much;
-    `floor`: the least part of the base's.
+    left, and that they leave; `floor`: the least part of the base's.
     """
     again = any(earlier.at_reversals for earlier in before)
     if again and (effect.at_reversals or effect.isolated):
         return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
     if effect.leftover:
         return min(EASY_OF_BASE * base, NEARLY_ALL * left)
-    return max(floor * base, min(OF_BASE * base, part * left))
+    return max(floor * base, min(OF_BASE * base, MOST * left))
 
 
 def _again(finalist: Finalist, taken: list[Taken]) -> bool:
@@ -290,6 +289,10 @@ def _again(finalist: Finalist, taken: list[Taken]) -> bool:
     own = finalist.trial.candidate
     several = own.lines is not None or own.effect.several
     return not several and any(t.trial.candidate.effect.name == own.effect.name for t in taken)
+
+
+# What noise of the encoder makes, by the controller's answer, is a quarter of the rest at most.
+HALF = 0.5
 
 
 def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool:
@@ -304,7 +307,7 @@ def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool
     if wide is None or _alike(finalist, now, wide, 2.0, least):
         return True
     term = finalist.trial.candidate.term
-    most = now.energy - finalist.energy >= MOST * now.energy
+    most = now.energy - finalist.energy >= HALF * now.energy
     loud = term.swings and most and between is not None
     return loud and _alike(finalist, now, between, BETWEEN, least)
 
@@ -328,27 +331,30 @@ def _alike(finalist: Finalist, now: Fit, wide: Evidence, factor: float, least: f
     return positive and 1 / factor < ratio < factor and enough
 
 
-def marks(candidate: Candidate) -> frozenset[Hashable]:
-    """By what a candidate may be out of question: as its effect, or as this form of its law."""
-    return frozenset({candidate.effect.name, jax.tree.structure(candidate.term)})
-
-
-def _elsewhere(found: Named, refuted: frozenset[Hashable]) -> tuple[Fit, list[Taken]]:
-    """What was found but for what acts at reversals or is out of question."""
+def _elsewhere(found: Named) -> tuple[Fit, list[Taken]]:
+    """What was found but for what acts at reversals."""
     start = len(found.last.terms) - len(found.taken)
-    mine = [t.trial.candidate for t in found.taken]
-    kept = [i for i, c in enumerate(mine) if not (c.effect.at_reversals or marks(c) & refuted)]
+    mine = [t.trial.candidate.effect for t in found.taken]
+    kept = [i for i, effect in enumerate(mine) if not effect.at_reversals]
     last = found.last.only([*range(start), *(start + i for i in kept)])
     return last, [found.taken[i] for i in kept]
 
 
 def _pruned(evidence, now, taken, size):
-    """Without terms that the newest one, or the base refitted beside it, has made idle."""
+    """Without terms that the newest one, or the base refitted beside it, has made idle.
+
+    Idle is, too, what does not help to predict blocks that it was not fitted to; of a force of one
+    moment no other block knows.
+    """
     start = len(now.terms) - len(taken)
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     for place in reversed(range(start, len(now.terms))):
         less = without(now, evidence, place)
-        gain = 1 - now.energy / less.energy
-        if taken[place - start].trial.score(gain, size) <= 0 or gain < LEAST_SHARE:
+        gain, trial = 1 - now.energy / less.energy, taken[place - start].trial
+        idle = trial.score(gain, size) <= 0 or gain < LEAST_SHARE
+        if not trial.candidate.effect.momentary:
+            idle |= left_out(now, block) >= left_out(less, block)
+        if idle:
             now = less
             taken = [t for i, t in enumerate(taken) if i != place - start]
     return now, taken

@@ -11,8 +11,10 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
 from ..units import spell
+from .evidence import Evidence
 from .intervals import covariance
-from .regression import Fit
+from .predictions import with_predictions
+from .regression import Fit, fit
 
 
 def whole(now: Fit) -> AbstractTerm:
@@ -50,6 +52,12 @@ def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[s
         }
         result.append(named | _waves(term, values, matrix[np.ix_(places, places)], named, freedom))
     return result
+
+
+def seen_by(view: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
+    """The parameters of a model refitted to another view of the machine, in `count` blocks."""
+    again = fit(known.terms, with_predictions(view, known), known.betas, 4)
+    return estimates(again, np.arange(len(view.rows)) * count // len(view.rows), units)
 
 
 _wave = programs.compiled(wave)

@@ -1,10 +1,14 @@
 """What a machine can have: a load within its inertia and friction, a memory of a curve it shows."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..terms.base import leaves
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
+from . import parameters as spelled
+from .chance import blocks
 from .contest import Contest, Finalist
 from .evidence import Evidence
 from .regression import Fit, fit
@@ -73,6 +77,33 @@ def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
     own, most = _beside(finalist, now, evidence)
     enough = own.friction <= most["coulomb"] + most["stribeck_force"]
     return own.inertia <= most["inertia"] and enough
+
+
+def weightless(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
+    """Numbers of the last `count` terms that add inertia, all of which may as well be none.
+
+    Of a load on a spring that leaves its friction, which acts late: another effect, with fewer
+    parameters. The last number comes first. The errors contain what a kernel of twice the width
+    changes, `wide`.
+    """
+    start = len(now.terms) - count
+    if not any(term.inertial for term in now.terms[start:]):
+        return
+    units = evidence.motion.unit_names
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    values = spelled.estimates(now, block, units)
+    if wide is not None:
+        there = spelled.seen_by(wide, now, int(block[-1]) + 1, units)
+        values = [spelled.with_smoothing(*pair) for pair in zip(values, there, strict=True)]
+    for number in reversed(range(count)):
+        term, known = now.terms[start + number], values[start + number]
+        sizes = (
+            estimate.interval()
+            for name, estimate in known.items()
+            if name.startswith("amplitude") or any(name == p.name for p in term.affine)
+        )
+        if term.inertial and not any(low * high > 0 for low, high in sizes):
+            yield number
 
 
 def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[Burden, dict[str, float]]:

@@ -1,6 +1,5 @@
 """What is asked of a recording: its rows, aligned, and what the baseline leaves of them."""
 
-import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from .candidates import Field
 from .chance import blocks
-from .evidence import Evidence, gather
+from .evidence import Evidence, Motion, gather, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .reversals import yields
@@ -27,24 +26,25 @@ Wider = tuple[Evidence | None, Evidence | None]
 
 
 class Question(NamedTuple):
-    """A recording through a kernel and one of twice the width, its base fit, the held-out one.
+    """A recording through a kernel and one of twice the width, and its base fit.
 
     `between`: through a kernel a third wider, where there is one; `delay`: how much later the
     force was taken, s; `block`: of each row; `structure`: the baseline; `fields`: the candidates
     with their columns, and, kept, those of other rows of this motion; `within`: where rows reach
-    across reversals, the question with those that do not.
+    across reversals, the question with those that do not; `held`: rows of the held-out recording,
+    once everything has been chosen without it.
     """
 
     evidence: Evidence
     wide: Evidence | None
     between: Evidence | None
-    held: Evidence | None
     base: Fit
     block: np.ndarray
     structure: AbstractTerm
     fields: tuple[Field, ...]
     delay: float
     within: "Question | None" = None
+    held: Evidence | None = None
 
     @property
     def reversals(self) -> bool:
@@ -63,24 +63,23 @@ class Question(NamedTuple):
 
 
 def ask(
-    recording: Recording,
-    holdout: Recording | None,
+    recording: Recording | Motion,
     structure: AbstractTerm,
     known: Fit | None = None,
     before: Question | None = None,
 ) -> Question:
-    """The rows of recording and held-out recording, force and motion aligned.
+    """The rows of a recording, force and motion aligned.
 
     **Arguments:** `known`: the model to align by, by default the baseline; `before`: a question
     about the same baseline, whose columns serve again if only the force has been shifted since.
     """
-    motion = from_position(recording)
+    motion = motion_of(recording)
     evidence = gather(motion)
     if before is not None:
-        return _aligned(motion, evidence, holdout, structure, known, before.fields)
+        return _aligned(motion, evidence, structure, known, before.fields)
     field = Field(evidence, structure)
     try:
-        asked = _aligned(motion, evidence, holdout, structure, known, (field,))
+        asked = _aligned(motion, evidence, structure, known, (field,))
     except BaseException:
         field.close()
         raise
@@ -90,23 +89,28 @@ def ask(
     return asked
 
 
-def opened(recording: Recording, holdout: Recording | None, asked: Question) -> Question | None:
+def opened(recording: Recording | Motion, asked: Question) -> Question | None:
     """The question with rows across reversals too, where the axis moves there instead of sticking.
 
     `None` where it sticks.
     """
-    motion, width, delay = from_position(recording), asked.evidence.width, asked.delay
+    motion, width, delay = motion_of(recording), asked.evidence.width, asked.delay
     if not yields(motion, asked.evidence, asked.base):
         return None
     evidence = gather(motion, width, delay, True)
     wide = _wider(motion, evidence, delay, True)
-    question = _put(
-        motion, evidence, wide, holdout, asked.structure, asked.base, asked.fields, delay, True
-    )
+    question = _put(motion, evidence, wide, asked.structure, asked.base, asked.fields, delay, True)
     return question._replace(within=asked)
 
 
-def _aligned(motion, evidence: Evidence, holdout, structure, known, fields) -> Question:
+def beside(asked: Question, holdout: Recording | Motion) -> Question:
+    """The question with a held-out recording's rows, by the same kernel, s, and alignment, s."""
+    reach = asked.evidence.reach
+    held = gather(motion_of(holdout), delay=asked.delay, reversals=asked.reversals, reach=reach)
+    return asked._replace(held=held)
+
+
+def _aligned(motion, evidence: Evidence, structure, known, fields) -> Question:
     wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
     known = fit([structure], evidence) if known is None else known
     # To first order a delay is a column; the first estimate is good to a fifth of a sample.
@@ -119,25 +123,22 @@ def _aligned(motion, evidence: Evidence, holdout, structure, known, fields) -> Q
         wide = None if wide is None else gather(motion, wide.width, delay)
         if abs(delay - last) < 0.5 * ALIGNED * sample:
             break
-    return _put(motion, evidence, wide, holdout, structure, known, fields, delay, False)
+    return _put(motion, evidence, wide, structure, known, fields, delay, False)
 
 
 def _put(
-    motion, evidence: Evidence, wide, holdout, structure, known: Fit, fields, delay, across
+    motion, evidence: Evidence, wide, structure, known: Fit, fields, delay, across
 ) -> Question:
-    held = None
-    if holdout is not None:
-        held = gather(from_position(holdout), evidence.width, delay, across)
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     field = next((f for f in fields if f.serves(evidence)), None) or Field(evidence, structure)
     kept = (field, *(f for f in fields if f is not field))
     between = _wider(motion, evidence, delay, across, BETWEEN)
-    return Question(evidence, wide, between, held, base, block, structure, kept, delay)
+    return Question(evidence, wide, between, base, block, structure, kept, delay)
 
 
 def _wider(
-    recording: Recording, narrow: Evidence, delay=0.0, across=False, factor=2.0
+    recording: Motion, narrow: Evidence, delay=0.0, across=False, factor=2.0
 ) -> Evidence | None:
     """The recording through a wider kernel; `None` if whole steps between the nodes allow none, or
     too few rows would be left to judge by.
@@ -148,13 +149,6 @@ def _wider(
     except ValueError:
         return None
     return wide if wide.width > narrow.width else None
-
-
-def from_position(recording: Recording) -> Recording:
-    """A recorded velocity is late by its filter, which would look like a delay of the force."""
-    if recording.position is None:
-        return recording
-    return dataclasses.replace(recording, velocity=None)
 
 
 def _lateness(views: list[Evidence], known: Fit) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from .chance import DRAWS
-from .evidence import Evidence, lengthened
+from .evidence import Evidence, Motion, motion_of
 from .regression import Fit
 
 # Part of the way from one break-away level to the other that counts, on both sides of the middle:
@@ -24,7 +24,7 @@ BETWEEN = 0.7
 LEAST_SAMPLES = 4
 
 
-def yields(recording: Recording, evidence: Evidence, base: Fit) -> bool:
+def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool:
     """Whether the position follows the force while friction passes from one level to the other.
 
     In every reversal, the slope of position by force between the break-away levels of the base's
@@ -33,11 +33,12 @@ def yields(recording: Recording, evidence: Evidence, base: Fit) -> bool:
     **Arguments:** `recording` with a position, `(N,)`, and its `evidence`; `base`, the fit of the
     baseline.
     """
-    if recording.position is None:
+    motion = motion_of(recording)
+    if motion.recording.position is None:
         return False
-    position = np.asarray(recording.position)
+    position = np.asarray(motion.recording.position)
     slopes = np.array(
-        [_slope(level, position[at]) for at, level in passages(recording, evidence, base)]
+        [_slope(level, position[at]) for at, level in passages(motion, evidence, base)]
     )
     return bool(len(slopes)) and _one_way(slopes)
 
@@ -54,14 +55,15 @@ def _one_way(slopes: np.ndarray) -> bool:
 
 
 def passages(
-    recording: Recording, evidence: Evidence, base: Fit
+    recording: Recording | Motion, evidence: Evidence, base: Fit
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Samples of each reversal in which friction passes from one level to the other, and its
     force there in parts of the level, from −1 to 1.
     """
-    count, width = recording.num_samples, evidence.width
-    prepared, _ = lengthened(recording)
-    velocity, segment = np.asarray(prepared.velocity)[:count], np.asarray(recording.segment)
+    motion = motion_of(recording)
+    recording, width = motion.recording, evidence.width
+    count = recording.num_samples
+    velocity, segment = np.asarray(motion.padded.velocity)[:count], np.asarray(recording.segment)
     position, force = np.asarray(recording.position), np.asarray(recording.force)
     forward, backward = _levels(base, evidence)
     level = (2 * force - forward - backward) / max(forward - backward, 1e-300)

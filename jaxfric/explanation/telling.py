@@ -20,7 +20,8 @@ from .errors import document, filtered_errors
 from .evidence import Evidence
 from .explained import ELSEWHERE, Explanation, Finding, Moved
 from .figures import Figures
-from .improvement import Improved, elsewhere
+from .holdout import residuals
+from .improvement import Improved, beside_others, elsewhere
 from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .partial_residuals import moved as moved_curve, partial_residuals
@@ -51,6 +52,7 @@ def tell(
     first, found, rest = better.first, better.found, better.rest
     before, after = _places(asked, better, wrong, seed)
     findings, alone = _findings(found, asked, rest, first)
+    refuted = _refuted(better, asked)
     shown = partial_residuals(asked, better)
     standing = _stand_ins(alone, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
@@ -80,8 +82,9 @@ def tell(
         verdict=_doubted(verdict, remarks, known.fit is not None),
         where=_everywhere([_where(place, units, known.left) for place in before], findings, first),
         findings=findings,
+        not_confirmed=refuted,
         fit=errors,
-        not_visible=_not_visible(found, units, better.gone),
+        not_visible=_not_visible(found, units, (*better.gone, *(f.effect for f in refuted))),
         model=models[1],
         baseline=models[0],
         baseline_name=known.name,
@@ -241,9 +244,10 @@ HALF_ROUGH, HALF = 1.25, 0.5
 def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     """Whether what is left is far from the noise that neighbouring rows show, or much of it all.
 
-    What is named (`shares` by effect) has to explain the held-out recording as well. What belongs
-    to a moment excuses there as much as it takes here, and half as much again; where nothing is
-    named, any base that has to extrapolate may miss that by more.
+    What is named (`shares` by effect) has to explain the held-out recording as well: to within four
+    times the noise, and its larger part. Effects of time alone need not recur: held-out error is
+    allowed in proportion to what they explain here. Where nothing is named, any base that has to
+    extrapolate may miss that recording by more.
     """
     here, held = fit["force_error"], fit["holdout_force_error"]
 
@@ -253,16 +257,18 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     def left(view) -> float:
         return (view["after"] / max(view["before"], 1e-300)) ** 2
 
-    much = [here]
+    much, far = [here], False
     if held is not None:
         momentary = [share for name, share in shares.items() if EFFECTS[name].momentary]
         excused = HALF_ROUGH**2 * (left(here) + sum(momentary)) if momentary else 0.0
         much += [held] if left(held) > excused else []
+        if not momentary:
+            far = above(held, ROUGH)
     # The findings go from the mismatch to the noise, and less than half the way (in decades).
     halfway = np.sqrt(here["before"] * fit["noise_floor"])
     many = any(left(view) > HALF**2 and above(view, HALF_ROUGH) for view in much)
     many |= here["after"] > max(halfway, LINEARITY)
-    return bool(above(here, ROUGH) or (shares and many))
+    return bool(above(here, ROUGH) or (shares and (many or far)))
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
@@ -326,9 +332,22 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> tuple[list[Fin
                 share,
                 held,
                 taken.p_value,
+                confirmed=taken.confirmed,
             )
         )
     return findings, alone
+
+
+def _refuted(better: Improved, asked: Question) -> list[Finding]:
+    """What this recording shows and the held-out one does not bear out."""
+    if not better.refuted:
+        return []
+    every, _ = _findings(better.claimed[0], asked, better.claimed[1], better.first)
+    text = " The held-out recording does not bear it out: it is not in the model."
+    return [
+        every[n]._replace(confirmed=False, sentence=every[n].sentence + text)
+        for n in better.refuted
+    ]
 
 
 def _twins(found: Named, number: int) -> list[int]:
@@ -366,17 +385,14 @@ def _shares(
     `None` for what no other recording can say. Of a force that acts late all that undoing it takes
     away is its own; the others are judged with the force put back.
     """
-    where, left = rest
-    late = number == len(left.taken)
-    place, named = (asked, found) if late else rest
-    less = verification.lacking(named, with_predictions(place.evidence, named.last), number)
+    left = rest[1]
+    base = found.base if number == len(left.taken) else left.base
+    less = beside_others(found, rest, asked, number)
     # No more than the base leaves, which refitting in a few steps may miss.
-    share = float((min(less.energy, named.base.energy) - left.last.energy) / first.energy)
+    share = float((min(less.energy, base.energy) - left.last.energy) / first.energy)
     if asked.held is None or found.taken[number].trial.candidate.effect.momentary:
         return share, None
-    without, with_it = verification.residuals(
-        less, left.last, (place.held, where.held), left.rephased
-    )
+    without, with_it = residuals(less, rest, asked, number)
     power = np.sum(verification.residual(first, asked.held) ** 2)
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
 

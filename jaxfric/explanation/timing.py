@@ -6,12 +6,10 @@ better account, with what noise of the force it takes away on its own added agai
 the kernel is wide shows in no column; undoing it does.
 """
 
-import dataclasses
 import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..data.recording import Recording
@@ -20,10 +18,10 @@ from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
 from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial
-from .evidence import gather
-from .naming import MOST, MOST_JUDGED, Named, Taken, least_gain
+from .evidence import Motion, gather, motion_of
+from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
-from .question import Question, from_position
+from .question import Question
 from .regression import Fit, fast, fit, without
 
 Undo = Callable[[Recording, float], Recording]
@@ -46,12 +44,12 @@ class Late(NamedTuple):
     taken: Taken
     smoothed: float
 
-    def undone(self, recording: Recording) -> Recording:
-        """The recording with its force where it belongs."""
-        return self.undo(from_position(recording), self.time)
+    def undone(self, recording: Recording | Motion) -> Motion:
+        """The motion of a recording with its force where it belongs."""
+        return _undone(motion_of(recording), self.undo, self.time)
 
 
-def late(recording: Recording, asked: Question, found: Named) -> Late | None:
+def late(recording: Motion, asked: Question, found: Named) -> Late | None:
     """The delay or lag among the findings under its right name, where there is one."""
     start = len(found.last.terms) - len(found.taken)
     places = [i for i, term in enumerate(found.last.terms) if traits(term).late]
@@ -70,7 +68,7 @@ def late(recording: Recording, asked: Question, found: Named) -> Late | None:
 MOST_LATE = 0.5
 
 
-def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 0) -> Late | None:
+def overlooked(recording: Motion, asked: Question, found: Named, seed: int = 0) -> Late | None:
     """A delay or lag beside the findings that is too long for its first order to show.
 
     Times are doubled from one sampling period on until undoing them does more harm than good, which
@@ -108,19 +106,19 @@ def overlooked(recording: Recording, asked: Question, found: Named, seed: int = 
 class _Undoing:
     """A recording whose delay or lag is undone, and the terms that then explain it."""
 
-    def __init__(self, recording: Recording, asked: Question, known: Fit):
-        self.motion, self.asked, self.known = from_position(recording), asked, known
+    def __init__(self, recording: Recording | Motion, asked: Question, known: Fit):
+        self.motion, self.asked, self.known = motion_of(recording), asked, known
         pairs = zip(known.terms, known.betas, strict=True)
         self.terms, self.betas = zip(*(p for p in pairs if not traits(p[0]).late), strict=True)
-        noise = np.random.default_rng(0).normal(size=self.motion.num_samples)
-        self.noise = dataclasses.replace(self.motion, force=jnp.asarray(noise))
+        count = self.motion.recording.num_samples
+        self.noise = self.motion.forced(np.random.default_rng(0).normal(size=count))
         self.hiss = functools.cache(self._hiss)
         narrow = self.hiss(_as_it_is, 0.0, asked.evidence.width)
         self.power = fast(known) ** 2 / narrow  # of the force's noise, in the time domain, N²
 
     def _hiss(self, undo: Undo, time: float, width: int) -> float:
         """What white noise of the force leaves in a row, in parts of its power."""
-        rows = gather(undo(self.noise, time), width, reversals=self.asked.reversals).target
+        rows = gather(_undone(self.noise, undo, time), width, reversals=self.asked.reversals).target
         return float(np.mean(rows**2))
 
     def rest(self, undo: Undo, time: float, width: int | None = None) -> np.ndarray:
@@ -130,7 +128,7 @@ class _Undoing:
         rest counts as if it were untouched. What else is in the rest is left by both ways alike.
         """
         asked, width = self.asked, width or self.asked.evidence.width
-        view = gather(undo(self.motion, time), width, asked.delay, asked.reversals)
+        view = gather(_undone(self.motion, undo, time), width, asked.delay, asked.reversals)
         now = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
         before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
         left = float(np.mean(now.residual**2))
@@ -225,8 +223,7 @@ def settled(
         # As for any later term, but that an undone delay leaves nothing of its own.
         before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
         effect = others[number].trial.candidate.effect
-        part = MOST if there.held is None else MOST_JUDGED
-        least = least_gain(effect, before, found.base.energy, less.energy, part, 0.0)
+        least = least_gain(effect, before, found.base.energy, less.energy, 0.0)
         if less.energy - left.energy < least:
             left, others = less, [t for i, t in enumerate(others) if i != number]
     evidence = with_predictions(asked.evidence, left)
@@ -237,8 +234,18 @@ def settled(
     )
     rest = behind._replace(last=left, taken=others)
     taken = [*others, lateness.taken]
-    found = found._replace(last=now, taken=taken, left=behind.left, smoothed=lateness.smoothed)
+    found = found._replace(
+        last=now,
+        taken=taken,
+        left=behind.left,
+        smoothed=lateness.smoothed,
+        undone=lateness.undone,
+    )
     return found, rest
+
+
+def _undone(motion: Motion, undo: Undo, time: float) -> Motion:
+    return motion.forced(undo(motion.recording, time).force)
 
 
 def _as_it_is(motion: Recording, _: float) -> Recording:

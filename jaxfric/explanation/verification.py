@@ -121,16 +121,15 @@ def share(
     return float(np.sum(left**2) - np.sum(right**2)) / power
 
 
-def helps(less: Fit, more: Fit, evidence: Evidence, rephased: frozenset[int]) -> bool:
-    """Whether `more` is nearer to another recording than `less`.
+def nearer(more: np.ndarray, less: np.ndarray) -> bool:
+    """Whether the residual of `more` is smaller than that of `less`, N, both `(J,)`.
 
-    Both residuals are cut off at four of their standard deviations, by the median: isolated events
-    of that recording are not what a term is judged by.
+    Both are cut off at four of their standard deviations, by the median: isolated events of a
+    recording are not what a term is judged by.
     """
-    left, right = residuals(less, more, (evidence, evidence), rephased)
-    limit = 4 * np.median(np.abs(right)) / 0.6745
-    left, right = (np.minimum(np.abs(r), limit) for r in (left, right))
-    return bool(np.sum(left**2) > np.sum(right**2))
+    limit = 4 * np.median(np.abs(more)) / 0.6745
+    ours, theirs = (np.minimum(np.abs(r), limit) for r in (more, less))
+    return bool(np.sum(theirs**2) > np.sum(ours**2))
 
 
 def residuals(

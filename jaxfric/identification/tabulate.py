@@ -251,6 +251,10 @@ def explained(document: Mapping[str, Any]) -> list[Block]:
         said += [f"Run forward: velocity error {motion['before']:.2%} before, {after} after."]
     baseline = [f"baseline {document['baseline']['name']}"]
     findings = [_finding(finding) for finding in document["findings"]]
+    findings += [
+        [f"{finding['effect']}, not confirmed", f"  {finding['sentence']}"]
+        for finding in document.get("not_confirmed", [])
+    ]
     return [source, baseline, said, *_sanity(document), *findings, *_places(document)]
 
 

@@ -90,6 +90,11 @@ def steps(document: Mapping[str, Any]) -> list[str]:
             "Record a second run with the same motion and give it as --holdout: it shows whether "
             "the answer holds on data that it was not fitted to."
         )
+    for finding in document.get("not_confirmed") or ():
+        found.append(
+            f"What looks like {spoken(finding['effect'])} here is not borne out by the held-out "
+            "recording, and is not in the model: record both motions once more, to see which holds."
+        )
     for finding in findings:
         if finding.get("confusable_with"):
             known = EFFECTS.get(finding["effect"])

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -29,19 +30,38 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     """
     require_model(model, "predict")
     require(recording, "predict")
+    return _force(model, Prepared(recording))
+
+
+class Prepared:
+    """A recording with its velocity, and the derivative of its momentum: once for many models."""
+
+    def __init__(self, recording: Recording):
+        self.recording = signals.prepare(recording)
+        self._derived = recording.velocity is None
+
+    @cached_property
+    def choice(self) -> signals.Choice:
+        """The local polynomial that differentiates momentum, outside jit.
+
+        That which is best for a recorded velocity; for a derived one the wider of those that are
+        best for the first and the second derivative of the position.
+        """
+        if not self._derived:
+            return signals.choose(self.recording, self.recording.velocity)
+        both = (signals.choose(self.recording, order=order) for order in (1, 2))
+        return max(both, key=lambda each: each.half_width)
+
+
+def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
-    prepared = with_channels(model, signals.prepare(recording))
-    rate = _rate(model.momentum(prepared), prepared, recording.velocity is None)
+    prepared = with_channels(model, motion.recording)
+    rate = _rate(model.momentum(prepared), prepared, motion)
     return _later(prepared, model.force(prepared) + rate, delay)
 
 
-def _rate(momentum: Float[Array, " N"], prepared: Recording, derived: bool) -> Float[Array, " N"]:
-    """The zero-phase smoothing derivative of the momentum, shape `(N,)`.
-
-    On the host by the local polynomial that is best for a recorded velocity; for a derived one by
-    the wider of those that are best for the first and the second derivative of the position. Inside
-    jit by a parabola.
-    """
+def _rate(momentum: Float[Array, " N"], prepared: Recording, known: Prepared):
+    """The zero-phase smoothing derivative of the momentum, `(N,)`; inside jit by parabolas."""
     traced = signals.is_traced(prepared) or isinstance(momentum, jax.core.Tracer)
     if traced:
         motion = prepared
@@ -50,11 +70,7 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, derived: bool) -> F
         width = jax.lax.stop_gradient(signals.choose_half_width(motion, signals.TRACED_REACH))
         span = (width + 0.5) * signals.interval(prepared)
         return signals.local_quadratic(prepared, momentum, span, signals.TRACED_REACH)[1]
-    if derived:
-        first, second = (signals.choose(prepared, order=order) for order in (1, 2))
-        choice = max(first, second, key=lambda each: each.half_width)
-    else:
-        choice = signals.choose(prepared, prepared.velocity)
+    choice = known.choice
     rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree)
     return jnp.asarray(rate, momentum.dtype)
 
@@ -116,16 +132,19 @@ def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
     return found
 
 
-def in_motion(recording: Recording, delay: float = 0.0) -> Bool[np.ndarray, " N"]:
+def in_motion(
+    recording: Recording, delay: float = 0.0, prepared: Prepared | None = None
+) -> Bool[np.ndarray, " N"]:
     """The samples that a force error is taken over, `(N,)`.
 
     Valid ones, without [`outliers`][], that are faster than the slowest speed that is told from
     rest, by [`signals.scales`][]; of a model with a `delay`, s, also that much later, which is what
-    its force is for. At rest friction takes any value up to break-away.
+    its force is for. At rest friction takes any value up to break-away. `prepared`: as in
+    [`residual`][].
     """
-    prepared = signals.prepare(uniform(recording))
-    speed = np.abs(np.asarray(prepared.velocity))[: recording.num_samples]
-    moving = speed > float(signals.host_scales(prepared)[0].slowest)
+    motion = Prepared(uniform(recording)) if prepared is None else prepared
+    speed = np.abs(np.asarray(motion.recording.velocity))[: recording.num_samples]
+    moving = speed > float(signals.host_scales(motion.recording)[0].slowest)
     moving &= np.asarray(recording.mask)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
@@ -146,10 +165,18 @@ def delay_of(model: Model) -> float:
     return 0.0 if delay is None else float(delay)
 
 
-def residual(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
-    """The recorded force less the one by [`predict`][], N, `(N,)`, on the host."""
+def residual(
+    model: Model, recording: Recording, prepared: Prepared | None = None
+) -> Float[np.ndarray, " N"]:
+    """The recorded force less the one by [`predict`][], N, `(N,)`, on the host.
+
+    `prepared`: the recording made [`uniform`][jaxfric.data.recording] and prepared, where that has
+    been done.
+    """
+    require_model(model, "predict")
     # One of few lengths, so that few programs serve all recordings.
-    predicted = np.asarray(predict(model, uniform(recording)), float)[: recording.num_samples]
+    motion = Prepared(uniform(recording)) if prepared is None else prepared
+    predicted = np.asarray(_force(model, motion), float)[: recording.num_samples]
     return np.asarray(recording.force, float) - predicted
 
 
@@ -159,9 +186,10 @@ def force_error(model: Model, recording: Recording) -> float:
     No filter but the derivative in û: the noise of the recorded force is in it. NaN where nothing
     moves or no force is recorded.
     """
-    moving = in_motion(recording, delay_of(model))
+    prepared = Prepared(uniform(recording))
+    moving = in_motion(recording, delay_of(model), prepared)
     force = np.asarray(recording.force, float)
-    return relative(residual(model, recording)[moving], force[moving])
+    return relative(residual(model, recording, prepared)[moving], force[moving])
 
 
 def relative(left: Float[np.ndarray, " M"], force: Float[np.ndarray, " M"]) -> float:

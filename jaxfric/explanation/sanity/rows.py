@@ -10,9 +10,8 @@ from ...models import Model
 from ...simulators import AbstractSimulator
 from ...terms import KNOWN_FORCE
 from ..chance import blocks
-from ..evidence import Evidence, gather
+from ..evidence import Evidence, gather, motion_of
 from ..naming import LINEARITY
-from ..question import from_position
 from ..regression import RANK, orthonormal
 
 
@@ -56,7 +55,7 @@ def rows_of(recording: Recording, model: Model) -> Rows:
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
-    evidence = gather(from_position(recording))
+    evidence = gather(motion_of(recording))
     term = model.term
     own = evidence.columns(term, np.zeros((1, 0)))[0]
     force = np.asarray(evidence.motion.channels[KNOWN_FORCE], float)

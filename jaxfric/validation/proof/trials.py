@@ -13,9 +13,9 @@ import numpy as np
 from ...data.io import write_text
 from ...data.recording import Recording
 from ...explanation import Explanation, explain
-from ...explanation.evidence import gather
+from ...explanation.evidence import gather, motion_of
 from ...explanation.forward import motion_error
-from ...explanation.question import ask, from_position, opened
+from ...explanation.question import ask, beside, opened
 from ...explanation.verification import residual
 from ...identification.documents import to_json
 from ...models import named
@@ -130,12 +130,12 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
         for hidden in (run.hidden, run.hidden_holdout)
     )
     run_less, holdout_less = _without(run.recording, first), _without(run.holdout, second)
-    asked = ask(run_less, holdout_less, structure)
-    known = opened(run_less, holdout_less, asked) or asked
+    asked = ask(run_less, structure)
+    known = beside(opened(run_less, asked) or asked, holdout_less)
     for field in known.fields:
         field.close()  # nobody asks for the candidates' columns
     rows = known.evidence.width, known.delay, known.reversals
-    measured = gather(from_position(run.holdout), *rows).target
+    measured = gather(motion_of(run.holdout), *rows).target
     return _norm(residual(known.base, known.held)) / _norm(measured)
 
 

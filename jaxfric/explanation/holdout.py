@@ -1,0 +1,127 @@
+"""The held-out recording judges once, when everything has been chosen without it.
+
+Nothing is looked for again and nothing exchanged: a finding that does not bring the model nearer to
+the held-out recording is told as not confirmed, and the model does without it.
+"""
+
+import numpy as np
+
+from ..data.recording import Recording
+from ..simulation.prediction import delay_of
+from . import parameters as spelled, verification
+from .evidence import Motion
+from .figures import Figures
+from .improvement import Improved, Rest, beside_others, force_errors, lacking
+from .naming import Named
+from .question import Question, beside
+from .regression import Fit
+
+
+def check_signals(found: Named, recording: Recording, holdout: Recording) -> None:
+    """Raise `ValueError` if a finding reads a signal that the held-out recording lacks."""
+    ours, theirs = _signals(recording), _signals(holdout)
+    for taken in found.taken:
+        candidate = taken.trial.candidate
+        for signal in sorted((candidate.term.coordinates & ours) - theirs):
+            effect = candidate.effect.name.replace("_", " ")
+            raise ValueError(
+                f"{holdout.source or 'The held-out recording'} lacks {signal!r}, by which "
+                f"{recording.source or 'the recording'} shows {effect}, so that this cannot be "
+                "judged there. Add the signal, or explain without a held-out recording."
+            )
+
+
+def _signals(recording: Recording) -> set[str]:
+    """Beside the time, the velocity and the force, which every recording has or gets."""
+    placed = set() if recording.position is None else {"position"}
+    return placed | set(recording.channels)
+
+
+def confirmed(
+    better: Improved, asked: Question, holdout: Motion, figures: Figures
+) -> tuple[Improved, Question]:
+    """What the held-out recording bears out, and the question with its rows.
+
+    Each finding is judged beside the others, with nothing refitted there; then all of them
+    together, since the model that is saved is no worse than the baseline there either. What belongs
+    to a moment need not come again, and is not asked.
+    """
+    asked = beside(asked, holdout)
+    where, left = better.rest
+    undone = better.found.undone
+    late = undone is not None and len(better.found.taken) > len(left.taken)
+    rest: Rest = (beside(where, undone(holdout)) if late else asked, left)
+    found, rest = _rephased(better.found, asked, rest)
+    borne = [_borne_out(found, asked, rest, n) for n in range(len(found.taken))]
+    taken = [t._replace(confirmed=b) for t, b in zip(found.taken, borne, strict=True)]
+    found = found._replace(taken=taken)
+    rest = rest[0], rest[1]._replace(taken=taken[: len(rest[1].taken)])
+    claimed = found, rest
+    refuted = tuple(n for n, each in enumerate(borne) if each is False)
+    for number in reversed(refuted):
+        found, rest = lacking(found, rest, asked, number)
+    better = better._replace(found=found, rest=rest, claimed=claimed, refuted=refuted)
+    better = _measured(better, asked, figures)
+    lasting = tuple(n for n, each in enumerate(borne) if each is not None)
+    if better.after.worse(better.before, figures.rounding) and lasting != refuted:
+        for number in reversed([n for n, t in enumerate(found.taken) if t.confirmed]):
+            found, rest = lacking(found, rest, asked, number)
+        better = better._replace(found=found, rest=rest, refuted=lasting)
+        better = _measured(better, asked, figures)
+    if better.after.worse(better.before, figures.rounding):
+        base = found._replace(last=better.first, taken=[])
+        every = tuple(range(len(taken)))
+        better = better._replace(found=base, rest=(asked, base), refitted=False, refuted=every)
+        better = _measured(better, asked, figures)
+    return better, asked
+
+
+def _measured(better: Improved, asked: Question, figures: Figures) -> Improved:
+    """With the errors of both models on both recordings, over the same samples."""
+    units = asked.evidence.motion.units
+    base = better.found._replace(last=better.first, taken=[])
+    delay = delay_of(spelled.model(better.found.last, units))
+    before = force_errors(base, (asked, base), asked, figures, units, delay)
+    alike = not better.found.taken and not better.refitted
+    after = before if alike else force_errors(better.found, better.rest, asked, figures, units)
+    return better._replace(before=before, after=after)
+
+
+def _rephased(found: Named, asked: Question, rest: Rest) -> tuple[Named, Rest]:
+    """The findings with their waves at another phase there, if only so they are borne out.
+
+    The zero of an incremental encoder is another after each homing, for all waves at once.
+    """
+    where, left = rest
+    start = len(left.last.terms) - len(left.taken)
+    waves = [n for n in range(len(left.taken)) if verification.wavelike(left.last, start + n)]
+    if not waves or all(_borne_out(found, asked, rest, n) for n in waves):
+        return found, rest
+
+    def turned(named: Named) -> Named:
+        taken = [t._replace(rephased=n in waves) for n, t in enumerate(named.taken)]
+        return named._replace(taken=taken)
+
+    again = turned(found), (where, turned(left))
+    if any(_borne_out(again[0], asked, again[1], n) for n in waves):
+        return again
+    return found, rest
+
+
+def _borne_out(found: Named, asked: Question, rest: Rest, number: int) -> bool | None:
+    """Whether the model with a finding is nearer to the held-out recording than without it.
+
+    `None` for what no other recording can say.
+    """
+    if found.taken[number].trial.candidate.effect.momentary:
+        return None
+    less = beside_others(found, rest, asked, number)
+    without, with_it = residuals(less, rest, asked, number)
+    return verification.nearer(with_it, without)
+
+
+def residuals(less: Fit, rest: Rest, asked: Question, number: int) -> tuple[np.ndarray, np.ndarray]:
+    """What is left of the held-out recording without a finding, and with all of them, N, `(J,)`."""
+    where, left = rest
+    place = asked if number == len(left.taken) else where
+    return verification.residuals(less, left.last, (place.held, where.held), left.rephased)
