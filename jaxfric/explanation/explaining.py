@@ -341,4 +341,4 @@ def _searched(recording, asked: Question, seed) -> tuple[Question, Named]:
     across = opened(recording, asked)
     if across is None:
         return asked, found
-    return across, search(across.evidence, asked.base, across.field, across.wider, seed, found)
+    return across, search(across.evidence, across.base, across.field, across.wider, seed, found)
