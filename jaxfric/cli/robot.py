@@ -22,6 +22,7 @@ from ..report import page, robot
 from ..simulators import Mujoco
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..simulators.patching import folder_of, patched
+from ..terms.effects.parameter_mismatch import MISMATCH
 from .commands import put, read, today, working
 from .options import message, say, standard
 
@@ -224,7 +225,7 @@ def _bodies(joint: Joint) -> dict[str, float]:
     """The wrong values of bodies that nothing else could stand for."""
     found: dict[str, float] = {}
     for finding in joint.told.findings if joint.told else []:
-        if finding.effect == "parameter_mismatch" and not finding.instead:
+        if finding.effect == MISMATCH and not finding.instead:
             found |= {
                 key: float(m.value) for key, m in finding.parameters.items() if key[:5] == "body/"
             }
@@ -278,7 +279,7 @@ def _severe(told: Explanation) -> list[str]:
 
 
 def _said(finding) -> str:
-    if finding.effect == "parameter_mismatch":
+    if finding.effect == MISMATCH:
         return finding.sentence.removeprefix("Wrong in the simulator: ").rpartition("; ")[0]
     return finding.sentence
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..simulators import Attribute
+from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation, Finding, Moved
 from .sentences import quantity
 
-MISMATCH = "parameter_mismatch"
 # Corrections that are no attribute by themselves.
 GAIN, CONSTANT = "gain", "offset"
 # More than these no one reads.

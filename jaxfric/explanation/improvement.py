@@ -7,6 +7,7 @@ import numpy as np
 
 from ..models import Model
 from ..simulation.prediction import delay_of
+from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled, verification
 from .figures import Figures
 from .naming import LEAST_SHARE, Named
@@ -90,7 +91,7 @@ def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Fig
     names = [taken.trial.candidate.effect.name for taken in start.taken]
     gone = tuple(dict.fromkeys(n for n in names if names.count(n) > kept.count(n)))
     if spoilt is not None and not gone:
-        gone = ("parameter_mismatch",)
+        gone = (MISMATCH,)
     return Improved(first, found, rest, refitted, before, after, gone, spoilt)
 
 

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data.recording import Recording
-from ..terms.actuator import TransportDelay
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
+from ..terms.effects.late import TransportDelay
 from .candidates import Field
 from .chance import blocks
 from .evidence import Evidence, Motion, gather, motion_of

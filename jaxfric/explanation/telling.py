@@ -10,6 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effect import Extent
 from ..terms.effects import EFFECTS
+from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, freed
 from .bins import unit
@@ -187,7 +188,7 @@ def _moved(
         text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
     instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(
-        "parameter_mismatch", "θ = θ₀ + Δθ", text, (), "", moved,
+        MISMATCH, PARAMETER_MISMATCH.equation, text, (), "", moved,
         wrong.share, held, wrong.p_value, instead=instead,
     )  # fmt: skip
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..explanation import Explanation
-from ..explanation.attributes import CONSTANT, GAIN, MISMATCH
+from ..explanation.attributes import CONSTANT, GAIN
 from ..explanation.errors import through_kernel
 from ..models import Model
 from ..simulators import Mujoco
@@ -18,6 +18,7 @@ from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
+from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
 from .rerun import Rerun, rerun
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..terms.effects import EFFECTS
+from ..terms.effects.parameter_mismatch import MISMATCH
 
-MISMATCH = "parameter_mismatch"
 # More steps than this are no advice.
 MOST = 4
 # A share of the force beyond what noise makes that is worth another look.

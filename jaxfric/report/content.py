@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..terms.effects.parameter_mismatch import MISMATCH
 from . import charts, equations
 from .advice import spoken
 
@@ -145,7 +146,7 @@ def parameters(document: Mapping[str, Any]) -> list[tuple[str, ...]]:
     baseline = (document.get("baseline") or {}).get("parameters") or {}
     rows = [(name, *_estimate(entry)) for name, entry in baseline.items()]
     for finding in document.get("findings") or ():
-        if finding["effect"] != "parameter_mismatch":
+        if finding["effect"] != MISMATCH:
             rows += [
                 (name, *_estimate(entry))
                 for name, entry in (finding.get("parameters") or {}).items()

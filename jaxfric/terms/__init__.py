@@ -1,22 +1,43 @@
 """The physics: one law, one class, one displayed equation."""
 
-from .actuator import (
-    ActuatorDeadband as ActuatorDeadband,
-    ActuatorLag as ActuatorLag,
-    ActuatorSaturation as ActuatorSaturation,
-    GainAsymmetry as GainAsymmetry,
-    TransportDelay as TransportDelay,
-)
 from .base import (
     AbstractLaw as AbstractLaw,
     AbstractTerm as AbstractTerm,
     Directional as Directional,
     Sum as Sum,
 )
-from .curvature import (
-    CrossAxis as CrossAxis,
-    FrictionAsymmetry as FrictionAsymmetry,
-    LoadDependentFriction as LoadDependentFriction,
+from .effects.actuator_deadband import ActuatorDeadband as ActuatorDeadband
+from .effects.actuator_saturation import ActuatorSaturation as ActuatorSaturation
+from .effects.asymmetric_friction import FrictionAsymmetry as FrictionAsymmetry
+from .effects.backlash import Backlash as Backlash, ElasticBacklash as ElasticBacklash
+from .effects.cogging import Cogging as Cogging
+from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance
+from .effects.cross_axis import CrossAxis as CrossAxis
+from .effects.disturbance_pulses import DisturbancePulses as DisturbancePulses
+from .effects.end_stop import EndStop as EndStop, LowerEndStop as LowerEndStop
+from .effects.frictional_lag import FrictionalLag as FrictionalLag
+from .effects.gain_asymmetry import GainAsymmetry as GainAsymmetry
+from .effects.gravity_unbalance import GravityUnbalance as GravityUnbalance
+from .effects.late import ActuatorLag as ActuatorLag, TransportDelay as TransportDelay
+from .effects.load_dependent_friction import LoadDependentFriction as LoadDependentFriction
+from .effects.load_drift import LoadDrift as LoadDrift
+from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturbance
+from .effects.position_dependent_friction import (
+    PositionDependentFriction as PositionDependentFriction,
+)
+from .effects.position_dependent_inertia import (
+    PositionDependentInertia as PositionDependentInertia,
+)
+from .effects.presliding import Dahl as Dahl, LuGre as LuGre
+from .effects.springs import HardeningSpring as HardeningSpring, Spring as Spring
+from .effects.steps import (
+    FrictionStep as FrictionStep,
+    GainStep as GainStep,
+    PayloadChange as PayloadChange,
+)
+from .effects.sticky_spot import StickySpot as StickySpot
+from .effects.thermal_drift import ThermalDrift as ThermalDrift
+from .effects.viscous_nonlinearity import (
     PowerLaw as PowerLaw,
     QuadraticDrag as QuadraticDrag,
     ShearThinning as ShearThinning,
@@ -40,39 +61,8 @@ from .known import (
     KnownGain as KnownGain,
     channels_of as channels_of,
 )
-from .position import (
-    Cogging as Cogging,
-    EndStop as EndStop,
-    Gravity as Gravity,
-    GravityUnbalance as GravityUnbalance,
-    HardeningSpring as HardeningSpring,
-    LowerEndStop as LowerEndStop,
-    PositionDependentFriction as PositionDependentFriction,
-    PositionDependentInertia as PositionDependentInertia,
-    Spring as Spring,
-    StickySpot as StickySpot,
-)
-from .presliding import (
-    AbstractMemory as AbstractMemory,
-    Dahl as Dahl,
-    FrictionalLag as FrictionalLag,
-    LuGre as LuGre,
-)
+from .position import Gravity as Gravity
+from .presliding import AbstractMemory as AbstractMemory
 from .sample import Parameter as Parameter, Resolution as Resolution, Sample as Sample
 from .table import Table as Table
-from .time import (
-    AbstractModulated as AbstractModulated,
-    DisturbancePulses as DisturbancePulses,
-    FrictionStep as FrictionStep,
-    GainStep as GainStep,
-    LoadDrift as LoadDrift,
-    PayloadChange as PayloadChange,
-    PeriodicDisturbance as PeriodicDisturbance,
-    ThermalDrift as ThermalDrift,
-)
-from .transmission import (
-    Backlash as Backlash,
-    Compliance as Compliance,
-    DryCompliance as DryCompliance,
-    ElasticBacklash as ElasticBacklash,
-)
+from .time import AbstractModulated as AbstractModulated

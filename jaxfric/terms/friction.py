@@ -11,10 +11,8 @@ from jaxtyping import Array, Float
 
 from ..units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY
 from .base import AbstractLaw
-from .sample import Parameter, Sample
+from .sample import UNKNOWN, Parameter, Sample
 from .text import Syntax
-
-UNKNOWN = float("nan")
 
 
 class Coulomb(AbstractLaw):

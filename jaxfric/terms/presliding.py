@@ -4,7 +4,6 @@ A term with a memory is a function of the whole recording, not of a sample. `sim
 memory of bristles (Dahl, LuGre), a state that follows the motion; the others cannot stand in it.
 """
 
-import dataclasses
 from abc import abstractmethod
 from typing import ClassVar
 
@@ -14,13 +13,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from ..data.recording import Recording
-from ..units import FORCE, POSITION, TIME, VELOCITY
-from .base import AbstractTerm, joined, vector
-from .friction import AbstractBump, Gaussian
-from .sample import Burden, Parameter
+from .base import AbstractTerm
+from .sample import Parameter
 from .text import Syntax
-
-UNKNOWN = float("nan")
 
 
 class AbstractMemory(AbstractTerm):
@@ -95,18 +90,6 @@ def bristle(recording: Recording, distance: Float[Array, ""]) -> Float[Array, " 
     return jax.lax.scan(relax, jnp.zeros_like(moved[0]), (keep, goal), unroll=8)[1]
 
 
-def _distance_bounds(scales):
-    """From one sample's way at the slowest slip to a tenth of the stroke.
-
-    A shorter transient is over before the first sample in slip. One longer than a tenth of the
-    stroke leaves no steady slip to compare with: it is a function of position.
-    """
-    return scales.slowest * scales.interval, 0.1 * (scales.high - scales.low)
-
-
-_DISTANCE = Parameter("presliding_distance", POSITION, _distance_bounds)
-
-
 class AbstractBristle(AbstractMemory):
     """A term whose columns are functions of the velocity and of Dahl's deflection z."""
 
@@ -123,110 +106,6 @@ class AbstractBristle(AbstractMemory):
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         deflection = bristle(recording, self.presliding_distance)
         return self.lagging(recording.velocity, deflection)
-
-
-class Dahl(AbstractBristle):
-    """Presliding that Coulomb friction lacks: F = F_p (z − sign v), dz = (dx/x_d)(1 − z sign(dx)).
-
-    `presliding_distance` x_d, m; F_p, equal to the Coulomb level for Dahl's model, is affine, and
-    the presliding stiffness is σ₀ = F_p/x_d (Dahl 1968; exponent one).
-    """
-
-    presliding_distance: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = (Parameter("presliding_force", FORCE),)
-    nonlinear: ClassVar = (_DISTANCE,)
-
-    def lagging(self, velocity, deflection) -> Float[Array, "N 1"]:
-        return (deflection - jnp.sign(velocity))[:, None]
-
-
-def _stribeck_bounds(scales):
-    """As for the bump itself: from the slowest slip to half the top speed."""
-    return scales.slowest, 0.5 * scales.fastest
-
-
-class LuGre(AbstractBristle):
-    """Presliding with a Stribeck curve: F = (F_p + F_b exp(−(v/v_s)²)) (z − sign v), z as in Dahl.
-
-    The LuGre model (Canudas de Wit, Olsson, Åström & Lischinsky 1995) for a bristle whose
-    stiffness scales with the friction level, so that `presliding_distance` x_d is constant, and
-    without micro-damping σ₁, which acts in presliding only. `stribeck_velocity` v_s, m/s.
-    """
-
-    presliding_distance: Float[Array, ""] | float = UNKNOWN
-    stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = (
-        Parameter("presliding_force", FORCE),
-        Parameter("presliding_stribeck_force", FORCE),
-    )
-    nonlinear: ClassVar = (_DISTANCE, Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds))
-
-    def lagging(self, velocity, deflection) -> Float[Array, "N 2"]:
-        lagging = deflection - jnp.sign(velocity)
-        bump = jnp.exp(-((velocity / self.stribeck_velocity) ** 2))
-        return jnp.stack([lagging, bump * lagging], axis=1)
-
-    def weights(self, s, distance, width):
-        return ("", s.call("exp", f"-(v / {width}) * (v / {width})"))
-
-
-def _memory_bounds(scales):
-    """From one sample to a fiftieth of the record: what lasts longer is no transient."""
-    return scales.interval, 0.02 * scales.duration
-
-
-class FrictionalLag(AbstractMemory):
-    """A Stribeck bump late by a dead time or lags: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
-
-    `bump` is g, in the steady state; constant and viscous friction have no memory (Armstrong-
-    Hélouvry, Dupont & Canudas de Wit 1994, section 2.4). `frictional_lag` τ, s, is the whole delay
-    of the memory: a dead time without `poles` (Hess & Soom 1990: a few to tens of milliseconds), so
-    many equal first-order lags otherwise. Through a reversal they differ: a filtered speed does not
-    vanish there, and the bump is not built up in full. To first order in τ only τ F_b shows.
-    """
-
-    frictional_lag: Float[Array, ""] | float = UNKNOWN
-    bump: AbstractBump = Gaussian()
-    poles: int = eqx.field(static=True, default=0)
-
-    @property
-    def affine(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        return self.bump.affine
-
-    @property
-    def nonlinear(self) -> tuple[Parameter, ...]:  # type: ignore[override]
-        return (Parameter("frictional_lag", TIME, _memory_bounds), *self.bump.nonlinear)
-
-    def beta(self) -> Float[Array, " d"]:
-        own = vector([self.frictional_lag])
-        return joined([own, self.bump.beta()])
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "FrictionalLag":
-        return dataclasses.replace(
-            self, frictional_lag=beta[..., 0], bump=self.bump.with_beta(beta[..., 1:])
-        )
-
-    def burden(self, beta, alpha) -> Burden:
-        return Burden(0.0, float(alpha[0]), curved=True)
-
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        direction, speed = jnp.sign(recording.velocity), jnp.abs(recording.velocity)
-        least = jnp.finfo(speed.dtype).tiny
-        late = jnp.maximum(self._late(recording, speed), least)
-        change = self.bump.shape(late) - self.bump.shape(jnp.maximum(speed, least))
-        return (direction * change)[:, None]
-
-    def _late(self, recording, speed):
-        begins = starts(recording)
-        steps = jnp.pad(jnp.diff(recording.time), (1, 0))
-        steps = jnp.where(begins, 0.0, jnp.maximum(steps, 0.0))
-        if not self.poles:
-            elapsed = jnp.cumsum(steps)
-            begin = jax.lax.cummax(jnp.where(begins, elapsed, 0.0))
-            return jnp.interp(jnp.maximum(elapsed - self.frictional_lag, begin), elapsed, speed)
-        for _ in range(self.poles):
-            speed = low_pass(speed, steps * self.poles / self.frictional_lag, begins)
-        return speed
 
 
 def low_pass(

@@ -11,6 +11,9 @@ from jaxtyping import Array, Float
 from ..data.recording import Recording
 from ..units import DIMENSIONLESS, FREQUENCY, Dimension
 
+UNKNOWN = float("nan")
+"""Of a nonlinear parameter: to be identified."""
+
 
 class Sample(eqx.Module):
     """One sample of a recording as a law of physics sees it: every field is a scalar.

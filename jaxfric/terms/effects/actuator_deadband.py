@@ -1,7 +1,28 @@
 """Force lost around zero command."""
 
-from ..actuator import ActuatorDeadband
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ...units import (
+    FORCE,
+)
+from ..actuator import PREDICTED
+from ..base import AbstractLaw
 from ..effect import Effect
+from ..sample import Parameter, Sample
+from ..table import reading
+
+
+class ActuatorDeadband(AbstractLaw):
+    """Force lost around zero command: u = f + δ sign(f), exact away from f = 0."""
+
+    affine: ClassVar = (Parameter("deadband", FORCE),)
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        return (jnp.sign(reading(sample, PREDICTED)),)
+
 
 ACTUATOR_DEADBAND = Effect(
     "actuator_deadband",

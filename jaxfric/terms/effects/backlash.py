@@ -1,11 +1,119 @@
 """A gap between motor and load."""
 
-import numpy as np
+from typing import ClassVar
 
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...data.recording import Recording
+from ...units import (
+    FORCE,
+    POSITION,
+)
 from ..base import AbstractTerm
 from ..effect import Effect, View, even, inside, product
-from ..transmission import Backlash, ElasticBacklash
+from ..presliding import AbstractMemory, starts
+from ..sample import UNKNOWN, Burden, Parameter
+from ..transmission import DECELERATION, OCTAVES, pushed
 from .compliance import coasting
+
+
+def play(recording: Recording, half_gap: Float[Array, ""]) -> Float[Array, " N"]:
+    """Where the motor side stands inside a gap, from −1 to 1 (the flanks), `(N,)`.
+
+    The play operator y ← clip(y, x − δ, x + δ) (Krasnosel'skii & Pokrovskii 1989): the load y is
+    dragged by the flanks. A segment starts at the flank that its velocity pushes, or in the
+    middle if at rest.
+    """
+    x = recording.position
+    begins = starts(recording)
+    first = x - half_gap * jnp.sign(recording.velocity)
+    low = jnp.where(begins, first, x - half_gap)
+    high = jnp.where(begins, first, x + half_gap)
+
+    def drag(load, flanks):
+        load = jnp.clip(load, *flanks)
+        return load, load
+
+    dragged = jax.lax.scan(drag, x[0], (low, high), unroll=8)[1]
+    return (x - dragged) / half_gap
+
+
+def _gap_bounds(scales):
+    """From one sample's way at the slowest slip to a tenth of the stroke, as for presliding."""
+    return scales.slowest * scales.interval, 0.1 * (scales.high - scales.low)
+
+
+class Backlash(AbstractMemory):
+    """Load that rests while the motor crosses a gap: u = f − F_L sign(v) (1 − (w/δ)⁸).
+
+    w is the place in the gap from −δ to δ (`play`), so the bracket is one inside and zero at
+    the flanks; `half_gap` δ, m. First order: the load's friction F_L is absent, while its inertia,
+    the impact and the ringing after it, which take a second mass, are left out.
+    """
+
+    half_gap: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("backlash_force", FORCE),)
+    nonlinear: ClassVar = (Parameter("half_gap", POSITION, _gap_bounds),)
+    coordinates: ClassVar = frozenset({"position", "velocity"})
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        inside = 1 - play(recording, self.half_gap) ** 8
+        return (-jnp.sign(recording.velocity) * inside)[:, None]
+
+
+def _windup_bounds(scales):
+    """From what a rigid flank is like to as much as the widest gap."""
+    low, high = _gap_bounds(scales)
+    return 0.1 * low, high
+
+
+# Flanks in touch: a load that strikes them comes back with half its speed, as in steel gears.
+_FLANKS = 0.2
+
+
+class ElasticBacklash(AbstractMemory):
+    """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
+
+    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`pushed`).
+    `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
+    is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
+    """
+
+    half_gap: Float[Array, ""] | float = UNKNOWN
+    windup: Float[Array, ""] | float = UNKNOWN
+    load_deceleration: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("backlash_force", FORCE),)
+    nonlinear: ClassVar = (
+        Parameter("half_gap", POSITION, _gap_bounds, resolution=OCTAVES),
+        Parameter("windup", POSITION, _windup_bounds, resolution=OCTAVES),
+        DECELERATION,
+    )
+    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
+
+    stepped: ClassVar = True
+    swings: ClassVar = True
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def burden(self, beta, alpha) -> Burden:
+        def lighter(factor: float) -> np.ndarray:
+            # The rows tell the friction well, and the inertia only by how the load coasts.
+            return beta * np.array([1.0, 1.0, factor])
+
+        return Burden(float(alpha[0] / beta[2]), float(alpha[0]), lighter=lighter)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return -recording.velocity[:, None] / self.load_deceleration
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        omega = jnp.sqrt(self.load_deceleration / self.windup)
+        push = pushed(recording, omega, _FLANKS, self.load_deceleration, self.half_gap)
+        return (push / self.load_deceleration - jnp.sign(recording.velocity))[:, None]
 
 
 def gaps(term: AbstractTerm, view: View) -> np.ndarray:

@@ -1,12 +1,183 @@
 """A load on a spring."""
 
 from collections.abc import Mapping
+from typing import ClassVar
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
+from ...data.recording import Recording
+from ...units import (
+    DIMENSIONLESS,
+    FORCE,
+    FREQUENCY,
+    INERTIA,
+)
 from ..base import AbstractTerm
 from ..effect import GRID, Effect, Extent, View, inside
-from ..transmission import Compliance, DryCompliance
+from ..presliding import AbstractMemory, starts
+from ..sample import UNKNOWN, Burden, Parameter, Resolution
+from ..transmission import DECELERATION, pushed
+
+
+def _resonance_bounds(scales):
+    """From four periods in the record to four samples a period."""
+    return 4.0 / scales.duration, 0.25 / scales.interval
+
+
+def _damping_bounds(scales):
+    """From a bare steel shaft to what no longer overshoots much."""
+    return 0.01, 0.7
+
+
+# A speed below this part of the root mean square is rest or the noise of it, and no direction.
+_REST = 0.03
+
+
+# A resonance is 2ζ of its frequency wide, 15 % of an octave at ζ = 0.05; a lighter damping is
+# refined from there. Damping ratios a factor of four apart differ in height by less than that.
+_RESONANCES = Resolution(0, 12, None, 96)
+
+
+_DAMPINGS = Resolution(0, 0.5, None, 4)
+
+
+class Compliance(AbstractMemory):
+    """Load on a spring and a damper, position on the motor: u = f + M_L r̈.
+
+    With r = x_L − x: r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v). `load_inertia` M_L, kg;
+    `load_friction` F_L, N, the part of the friction that acts on the load and so reaches the motor
+    by the spring; `load_resonance` ω/2π, Hz, at which the load swings against a held motor;
+    `damping_ratio` ζ. What excites it, `driven`, is "inertia", "friction" or "both"; what does
+    not is left out. The oscillator is exact for a velocity that is straight between the samples;
+    to first order the load goes the way of the motor, and none at rest. A segment starts with the
+    load at rest on its spring.
+    """
+
+    load_resonance: Float[Array, ""] | float = UNKNOWN
+    damping_ratio: Float[Array, ""] | float = UNKNOWN
+    driven: str = eqx.field(static=True, default="inertia")
+    nonlinear: ClassVar = (
+        Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_RESONANCES),
+        Parameter("damping_ratio", DIMENSIONLESS, _damping_bounds, resolution=_DAMPINGS),
+    )
+    swings: ClassVar = True
+
+    def __check_init__(self):
+        if self.driven not in _DRIVES:
+            raise ValueError(f"driven is one of {', '.join(_DRIVES)}, not {self.driven!r}.")
+
+    @property
+    def affine(self):
+        return _DRIVES[self.driven]
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def burden(self, beta, alpha) -> Burden:
+        known = {p.name: float(a) for p, a in zip(self.affine, alpha, strict=True)}
+        return Burden(known.get("load_inertia", 0.0), known.get("load_friction", 0.0))
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        span = jnp.pad(jnp.diff(recording.time), (1, 0))
+        real = ~starts(recording) & (span > 0)
+        span = jnp.where(real, span, 1.0)
+        speed = recording.velocity
+        rate = jnp.pad(jnp.diff(speed), (1, 0)) / span
+        mean = 0.5 * (speed + jnp.roll(speed, 1))
+        rest = _REST * jnp.sqrt(jnp.mean(speed**2)) + jnp.finfo(speed.dtype).tiny
+        pulls = {_LOAD_INERTIA: jnp.where(real, rate, 0.0)}
+        pulls[_LOAD_FRICTION] = jnp.clip(jnp.where(real, mean, speed) / rest, -1.0, 1.0)
+        pull = jnp.stack([pulls[parameter] for parameter in self.affine], axis=1)
+        return self._swinging(pull, span, real)
+
+    def _swinging(self, pull, span, real):
+        """ṙ, m/s, of each column of `pull`, m/s² `(N, p)`, over the span before each sample."""
+        omega = 2 * jnp.pi * self.load_resonance
+        decay = self.damping_ratio * omega
+        swing = omega * jnp.sqrt(1 - self.damping_ratio**2)
+        fading = jnp.exp(-decay * span)
+        cosine = fading * jnp.cos(swing * span)
+        sine = fading * jnp.sin(swing * span) / swing
+        sunk = pull / omega**2
+
+        def step(state, now):
+            stretch, rate = state
+            cosine, sine, sunk, real = now
+            # Free vibration about where the pull would hold the spring.
+            away = stretch + sunk
+            stretch = away * (cosine + decay * sine) + rate * sine - sunk
+            rate = rate * (cosine - decay * sine) - away * omega**2 * sine
+            state = jnp.where(real, stretch, -sunk), jnp.where(real, rate, 0.0)
+            return state, state[1]
+
+        rest = jnp.zeros_like(sunk[0])
+        return jax.lax.scan(step, (rest, rest), (cosine, sine, sunk, real), unroll=4)[1]
+
+
+_LOAD_INERTIA, _LOAD_FRICTION = (
+    Parameter("load_inertia", INERTIA),
+    Parameter("load_friction", FORCE),
+)
+
+
+_DRIVES = {
+    "inertia": (_LOAD_INERTIA,),
+    "friction": (_LOAD_FRICTION,),
+    "both": (_LOAD_INERTIA, _LOAD_FRICTION),
+}
+
+
+# What dry friction takes besides makes the resonance as wide as at a damping of 0.15 or so.
+_DRY = Resolution(0, 4, None, 32)
+
+
+class DryCompliance(AbstractMemory):
+    """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
+
+    M_L p is what the spring pushes the load by (`pushed`): [`Compliance`][] for a load whose
+    friction lets it stick, M_L d of it. `load_inertia` M_L, kg; `load_resonance` ω/2π, Hz;
+    `damping_ratio` ζ; `load_deceleration` d, m/s².
+    """
+
+    load_resonance: Float[Array, ""] | float = UNKNOWN
+    damping_ratio: Float[Array, ""] | float = UNKNOWN
+    load_deceleration: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (_LOAD_INERTIA,)
+    nonlinear: ClassVar = (
+        Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_DRY),
+        *Compliance.nonlinear[1:],
+        DECELERATION,
+    )
+    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
+
+    stepped: ClassVar = True
+    swings: ClassVar = True
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def burden(self, beta, alpha) -> Burden:
+        resonance, _, slow = beta
+        give = slow / (2 * np.pi * resonance) ** 2
+        return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return -recording.velocity[:, None]
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        omega = 2 * jnp.pi * self.load_resonance
+        push = pushed(recording, omega, self.damping_ratio, self.load_deceleration)
+        return (push - self.load_deceleration * jnp.sign(recording.velocity))[:, None]
+
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
 _DAMPING = (0.05, 0.15, 0.45)

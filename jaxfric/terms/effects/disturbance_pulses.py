@@ -2,12 +2,55 @@
 
 from collections.abc import Iterator
 from math import comb
+from typing import ClassVar
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
-from ..base import AbstractTerm
+from ...units import (
+    FORCE,
+)
+from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, Residual
-from ..time import DisturbancePulses
+from ..sample import Parameter, Sample
+from ..text import TURN, literal, signed
+
+
+class DisturbancePulses(AbstractLaw):
+    """Isolated pushes: F = Σ_i A_i cos²(π (t − t_i)/(2w)) for abs(t − t_i) < w.
+
+    `times` t_i and `width` w, s, are given numbers.
+    """
+
+    times: tuple[float, ...] = eqx.field(static=True, converter=lambda t: tuple(map(float, t)))
+    width: float = eqx.field(static=True)
+    coordinates: ClassVar = frozenset({"time"})
+
+    @property
+    def affine(self):
+        return tuple(Parameter(f"pulse_{i + 1}", FORCE) for i in range(len(self.times)))
+
+    @property
+    def chosen(self) -> int:
+        return len(self.times) + 1
+
+    def law(self, sample: Sample):
+        places = [jnp.clip((sample.time - at) / self.width, -1.0, 1.0) for at in self.times]
+        return tuple(jnp.cos(0.5 * jnp.pi * place) ** 2 for place in places)
+
+    def text(self, s):
+        half = literal(0.25 * TURN)
+        shapes = []
+        for at in self.times:
+            place = s.clip(f"(t - {signed(at)}) / {literal(self.width)}", "-1.0", "1.0")
+            wave = s.call("cos", f"{half} * {place}")
+            shapes.append(f"{wave} * {wave}")
+        return tuple(shapes)
+
+    def extent(self, values):
+        return {"time": (min(self.times) - self.width, max(self.times) + self.width)}
+
 
 # Standard deviations that a push must stand out by: of ten thousand places, noise reaches five in
 # one record of two hundred.

@@ -2,12 +2,81 @@
 
 import dataclasses
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from ..base import AbstractTerm, leaves
+from ...data.recording import Recording
+from ...units import (
+    TIME,
+)
+from ..base import AbstractTerm, joined, leaves, vector
 from ..effect import Effect, View, inside, product
 from ..friction import AbstractBump, Gaussian
-from ..presliding import FrictionalLag
+from ..presliding import AbstractMemory, low_pass, starts
+from ..sample import UNKNOWN, Burden, Parameter
+
+
+def _memory_bounds(scales):
+    """From one sample to a fiftieth of the record: what lasts longer is no transient."""
+    return scales.interval, 0.02 * scales.duration
+
+
+class FrictionalLag(AbstractMemory):
+    """A Stribeck bump late by a dead time or lags: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
+
+    `bump` is g, in the steady state; constant and viscous friction have no memory (Armstrong-
+    Hélouvry, Dupont & Canudas de Wit 1994, section 2.4). `frictional_lag` τ, s, is the whole delay
+    of the memory: a dead time without `poles` (Hess & Soom 1990: a few to tens of milliseconds), so
+    many equal first-order lags otherwise. Through a reversal they differ: a filtered speed does not
+    vanish there, and the bump is not built up in full. To first order in τ only τ F_b shows.
+    """
+
+    frictional_lag: Float[Array, ""] | float = UNKNOWN
+    bump: AbstractBump = Gaussian()
+    poles: int = eqx.field(static=True, default=0)
+
+    @property
+    def affine(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        return self.bump.affine
+
+    @property
+    def nonlinear(self) -> tuple[Parameter, ...]:  # type: ignore[override]
+        return (Parameter("frictional_lag", TIME, _memory_bounds), *self.bump.nonlinear)
+
+    def beta(self) -> Float[Array, " d"]:
+        own = vector([self.frictional_lag])
+        return joined([own, self.bump.beta()])
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "FrictionalLag":
+        return dataclasses.replace(
+            self, frictional_lag=beta[..., 0], bump=self.bump.with_beta(beta[..., 1:])
+        )
+
+    def burden(self, beta, alpha) -> Burden:
+        return Burden(0.0, float(alpha[0]), curved=True)
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        direction, speed = jnp.sign(recording.velocity), jnp.abs(recording.velocity)
+        least = jnp.finfo(speed.dtype).tiny
+        late = jnp.maximum(self._late(recording, speed), least)
+        change = self.bump.shape(late) - self.bump.shape(jnp.maximum(speed, least))
+        return (direction * change)[:, None]
+
+    def _late(self, recording, speed):
+        begins = starts(recording)
+        steps = jnp.pad(jnp.diff(recording.time), (1, 0))
+        steps = jnp.where(begins, 0.0, jnp.maximum(steps, 0.0))
+        if not self.poles:
+            elapsed = jnp.cumsum(steps)
+            begin = jax.lax.cummax(jnp.where(begins, elapsed, 0.0))
+            return jnp.interp(jnp.maximum(elapsed - self.frictional_lag, begin), elapsed, speed)
+        for _ in range(self.poles):
+            speed = low_pass(speed, steps * self.poles / self.frictional_lag, begins)
+        return speed
+
 
 # Times and widths of a bump that is late (a factor of 1.7 in either changes little), and exponents.
 _COUNTS = (12, 8, 3)

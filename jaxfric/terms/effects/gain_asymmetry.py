@@ -1,7 +1,28 @@
 """A gain that differs with the sign of the force."""
 
-from ..actuator import GainAsymmetry
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from ...units import (
+    DIMENSIONLESS,
+)
+from ..actuator import PREDICTED
+from ..base import AbstractLaw
 from ..effect import Effect
+from ..sample import Parameter, Sample
+from ..table import reading
+
+
+class GainAsymmetry(AbstractLaw):
+    """Different gain for positive force: u = f + κ max(f, 0)."""
+
+    affine: ClassVar = (Parameter("gain_asymmetry", DIMENSIONLESS),)
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        return (jnp.maximum(reading(sample, PREDICTED), 0.0),)
+
 
 GAIN_ASYMMETRY = Effect(
     "gain_asymmetry",

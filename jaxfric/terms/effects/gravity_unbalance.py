@@ -1,7 +1,58 @@
 """An eccentric mass on a turning axis."""
 
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...units import (
+    FORCE,
+    POSITION,
+)
+from ..base import AbstractLaw
 from ..effect import Effect, slowly
-from ..position import GravityUnbalance
+from ..position import (
+    POSITION_ONLY,
+    stroke,
+    wave,
+    waves,
+)
+from ..sample import UNKNOWN, Parameter, Resolution, Sample
+
+
+def _long_bounds(scales):
+    """From the longest period that repeats within the stroke to eight strokes.
+
+    There the sine spans ±π/8 about its middle and differs from a parabola by (π/8)³/6 = 1 %: a
+    longer period can no longer be told.
+    """
+    return stroke(scales), 8 * stroke(scales)
+
+
+# Less than a cycle: what is told apart are the curvatures of its pieces, not their phases.
+_LONG = Resolution(-1, 16, stroke, 16)
+
+
+class GravityUnbalance(AbstractLaw):
+    """Weight of an eccentric mass, hardly a turn a stroke: F = A sin(2πx/L + φ).
+
+    `unbalance_period` L, m (2π rad on the turning axis itself). The force's constant part cannot
+    be told from an [`Offset`][jaxfric.terms.Offset].
+    """
+
+    unbalance_period: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("unbalance", FORCE)
+    nonlinear: ClassVar = (
+        Parameter("unbalance_period", POSITION, _long_bounds, resolution=_LONG, repeats=True),
+    )
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * sample.position / self.unbalance_period)
+
+    def text(self, s, period):
+        return s.waves("x", period)
+
 
 GRAVITY_UNBALANCE = Effect(
     "gravity_unbalance",

@@ -1,13 +1,48 @@
 """A force that acts late: a dead time, or a lag."""
 
 import dataclasses
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 
 from ...data.recording import Recording
-from ..actuator import ActuatorLag, TransportDelay
+from ...units import TIME
+from ..actuator import PREDICTED
+from ..base import AbstractLaw
 from ..effect import Effect
+from ..sample import Parameter, Sample
+from ..table import reading
+
+
+class TransportDelay(AbstractLaw):
+    """Force that acts τ late: u = f(t + τ) = f + τ df/dt + O(τ²): first order.
+
+    The same column as [`ActuatorLag`][]; only the second order, ½ τ² d²f/dt², tells them apart.
+    """
+
+    affine: ClassVar = (Parameter("delay", TIME),)
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        return (jnp.zeros_like(sample.time),)
+
+    def impulse(self, sample: Sample):
+        return (reading(sample, PREDICTED),)
+
+
+class ActuatorLag(AbstractLaw):
+    """First-order lag of the force: u = f + T df/dt (exact)."""
+
+    affine: ClassVar = (Parameter("lag", TIME),)
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        return (jnp.zeros_like(sample.time),)
+
+    def impulse(self, sample: Sample):
+        return (reading(sample, PREDICTED),)
+
 
 FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quarter turn."
 

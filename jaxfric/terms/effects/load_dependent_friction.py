@@ -1,7 +1,36 @@
 """Friction that grows with the load."""
 
-from ..curvature import LoadDependentFriction
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from ...units import (
+    DIMENSIONLESS,
+)
+from ..base import AbstractLaw
 from ..effect import Effect
+from ..sample import Parameter, Sample
+from ..table import reading
+
+
+class LoadDependentFriction(AbstractLaw):
+    """Friction proportional to a load: F = μ abs(N) sign(v) (Amontons).
+
+    `load` names the channel with the load N: a recorded one, or by default the force that the
+    model without this term predicts.
+    """
+
+    load: str = eqx.field(static=True, default="predicted_force")
+    affine: ClassVar = (Parameter("load_friction", DIMENSIONLESS),)
+
+    @property
+    def coordinates(self):
+        return frozenset({self.load, "velocity"})
+
+    def law(self, sample: Sample):
+        return (jnp.abs(reading(sample, self.load)) * jnp.sign(sample.velocity),)
+
 
 LOAD_DEPENDENT_FRICTION = Effect(
     "load_dependent_friction",

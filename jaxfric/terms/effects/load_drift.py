@@ -1,9 +1,61 @@
 """A constant force that wanders."""
 
-from ..base import AbstractTerm
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from numpy.polynomial import legendre
+
+from ...units import (
+    FORCE,
+)
+from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect
-from ..sample import Scales
-from ..time import LoadDrift
+from ..sample import Parameter, Sample, Scales
+from ..text import literal, signed
+
+
+class LoadDrift(AbstractLaw):
+    """Constant force that wanders: F = Σ_n F_n P_n(τ), τ = 2 (t − t₀)/T − 1, n = 1 … `degree`.
+
+    P_n are Legendre's polynomials over the record that starts at `start` t₀ and lasts `duration`
+    T, s, both given numbers; n = 0 is the offset. Outside the record the ends' values hold.
+    """
+
+    start: float = eqx.field(static=True, default=0.0)
+    duration: float = eqx.field(static=True, default=1.0)
+    degree: int = eqx.field(static=True, default=3)
+    coordinates: ClassVar = frozenset({"time"})
+
+    @property
+    def affine(self):
+        return tuple(Parameter(f"load_drift_{n}", FORCE) for n in range(1, self.degree + 1))
+
+    def law(self, sample: Sample):
+        tau = jnp.clip(2 * (sample.time - self.start) / self.duration - 1, -1.0, 1.0)
+        polynomials = [jnp.ones_like(tau), tau]
+        for n in range(1, self.degree):  # Bonnet's recursion
+            newer = ((2 * n + 1) * tau * polynomials[-1] - n * polynomials[-2]) / (n + 1)
+            polynomials.append(newer)
+        return tuple(polynomials[1 : self.degree + 1])
+
+    def text(self, s):
+        tau = f"2.0 * (t - {signed(self.start)}) / {literal(self.duration)} - 1.0"
+        place = s.clip(tau, "-1.0", "1.0")
+        degrees = range(1, self.degree + 1)
+        return tuple(_horner(legendre.leg2poly([0.0] * n + [1.0]), place) for n in degrees)
+
+    def extent(self, values):
+        return {"time": (self.start, self.start + self.duration)}
+
+
+def _horner(coefficients, variable: str) -> str:
+    """A polynomial as text, the constant first."""
+    text = literal(coefficients[-1])
+    for coefficient in reversed(coefficients[:-1]):
+        text = f"({text} * {variable}"
+        text += f" + {literal(coefficient)})" if coefficient else ")"
+    return text
 
 
 def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:

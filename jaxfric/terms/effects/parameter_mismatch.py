@@ -2,4 +2,5 @@
 
 from ..effect import Effect
 
-PARAMETER_MISMATCH = Effect("parameter_mismatch", "θ = θ₀ + Δθ", "values")
+MISMATCH = "parameter_mismatch"
+PARAMETER_MISMATCH = Effect(MISMATCH, "θ = θ₀ + Δθ", "values")

@@ -1,7 +1,54 @@
 """A tone in time."""
 
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...units import (
+    FORCE,
+    FREQUENCY,
+)
+from ..base import AbstractLaw
 from ..effect import Effect, Waves
-from ..time import PeriodicDisturbance
+from ..position import wave, waves
+from ..sample import UNKNOWN, Parameter, Resolution, Sample
+from ..text import TURN, literal
+
+
+def _frequency_bounds(scales):
+    """From one and a half periods in the record to half of Nyquist's frequency.
+
+    Fewer periods are a drift; above, a force held over a sample is no longer the tone that acts.
+    """
+    return 1.5 / scales.duration, 0.25 / scales.interval
+
+
+def _record(scales):
+    return scales.duration
+
+
+# As for a pitch: out of step by a cycle over the record, the tone is another one.
+_TONES = Resolution(1, 4, _record, 4096)
+
+
+class PeriodicDisturbance(AbstractLaw):
+    """A tone in time: F = A sin(2πf t + φ). `frequency` f, Hz."""
+
+    frequency: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("tone", FORCE)
+    nonlinear: ClassVar = (
+        Parameter("frequency", FREQUENCY, _frequency_bounds, resolution=_TONES, repeats=True),
+    )
+    coordinates: ClassVar = frozenset({"time"})
+
+    def law(self, sample: Sample):
+        return waves(2 * jnp.pi * self.frequency * sample.time)
+
+    def text(self, s, frequency):
+        angle = f"{literal(TURN)} * {frequency} * t"
+        return (s.call("sin", angle), s.call("cos", angle))
+
 
 PERIODIC_DISTURBANCE = Effect(
     "periodic_disturbance",

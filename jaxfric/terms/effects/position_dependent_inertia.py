@@ -1,10 +1,50 @@
 """Inertia that varies along the stroke."""
 
-import numpy as np
+from typing import ClassVar
 
-from ..base import AbstractTerm
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...units import (
+    INERTIA,
+    POSITION,
+)
+from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, View, slowly
-from ..position import PositionDependentInertia
+from ..position import any_period, cycles, wave, waves
+from ..sample import UNKNOWN, Parameter, Sample
+from ..text import TURN, literal
+
+
+class PositionDependentInertia(AbstractLaw):
+    """Inertia that varies along the stroke: u = d(M₁v)/dt − ½ M₁′v², M₁ = A sin(2πx/L + φ).
+
+    Lagrange's equation for the kinetic energy ½ M₁(x) v². `inertia_period` L, m.
+    """
+
+    inertia_period: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = wave("inertia", INERTIA)
+    nonlinear: ClassVar = (
+        Parameter("inertia_period", POSITION, any_period, resolution=cycles(), repeats=True),
+    )
+    coordinates: ClassVar = frozenset({"position", "velocity", "acceleration"})
+
+    def law(self, sample: Sample):
+        rate = 2 * jnp.pi / self.inertia_period
+        sine, cosine = waves(rate * sample.position)
+        half = 0.5 * rate * sample.velocity**2
+        return (-half * cosine, half * sine)
+
+    def impulse(self, sample: Sample):
+        angle = 2 * jnp.pi * sample.position / self.inertia_period
+        return tuple(part * sample.velocity for part in waves(angle))
+
+    def text(self, s, period):
+        # The derivative carried out: u = M₁ a + ½ M₁′ v².
+        sine, cosine = s.waves("x", period)
+        half = f"{literal(0.5 * TURN)} / {period} * v * v"
+        return (f"(a * {sine} + {half} * {cosine})", f"(a * {cosine} - {half} * {sine})")
 
 
 def periods(term: AbstractTerm, view: View) -> np.ndarray:

@@ -1,7 +1,62 @@
 """Springs along the stroke."""
 
+from typing import ClassVar
+
+import equinox as eqx
+from jaxtyping import Array, Float
+
+from ...units import (
+    POSITION,
+    STIFFNESS,
+    Dimension,
+)
+from ..base import AbstractLaw
 from ..effect import Effect
-from ..position import HardeningSpring, Spring
+from ..position import (
+    POSITION_ONLY,
+    within,
+)
+from ..sample import UNKNOWN, Parameter, Sample
+from ..text import signed
+
+
+class Spring(AbstractLaw):
+    """Linear spring: F = k (x − x₀).
+
+    `rest` x₀, m, is a given number: moving it adds a constant, which the offset or the two
+    Coulomb levels take up. A place inside the stroke keeps that constant small.
+    """
+
+    rest: float = eqx.field(static=True, default=0.0)
+    in_joint: ClassVar = "spring"
+    affine: ClassVar = (Parameter("stiffness", STIFFNESS),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return (sample.position - self.rest,)
+
+    def text(self, s):
+        return (f"(x - {signed(self.rest)})",)
+
+
+class HardeningSpring(AbstractLaw):
+    """Cubic part of a spring: F = k₃ (x − x₀)³ (Duffing 1918).
+
+    `spring_centre` x₀, m, lies in the stroke.
+    """
+
+    spring_centre: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("cubic_stiffness", Dimension(force=1, position=-3)),)
+    nonlinear: ClassVar = (Parameter("spring_centre", POSITION, within, logarithmic=False),)
+    coordinates: ClassVar = POSITION_ONLY
+
+    def law(self, sample: Sample):
+        return ((sample.position - self.spring_centre) ** 3,)
+
+    def text(self, s, centre):
+        away = f"(x - {centre})"
+        return (f"{away} * {away} * {away}",)
+
 
 SPRING = Effect(
     "spring",

@@ -2,17 +2,144 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import ClassVar
 
+import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from ..base import AbstractTerm, Sum, summands
+from ...data.recording import Recording
+from ...units import (
+    DIMENSIONLESS,
+    TIME,
+)
+from ..base import AbstractLaw, AbstractTerm, Sum, summands, vector
 from ..effect import GRID, Effect, Extent, View, even
 from ..friction import Coulomb
-from ..inertia import Inertia
+from ..inertia import Inertia, Offset
 from ..known import KnownColumns
 from ..position import Gravity
-from ..sample import Scales
-from ..time import FrictionStep, GainStep, PayloadChange
+from ..sample import UNKNOWN, Parameter, Resolution, Sample, Scales
+from ..table import reading
+from ..text import literal
+from ..time import AbstractModulated
+
+
+def _within(scales):
+    """Inside the record but its first and last 2 %, where one level rests on too few samples."""
+    margin = 0.02 * scales.duration
+    return scales.start + margin, scales.start + scales.duration - margin
+
+
+# Two dates of a step differ by what lies between them only: the cost is no parabola but a wedge,
+# and a date is refined within a step of the grid.
+_MOMENTS = Resolution(1, 256, None, 256)
+
+
+class FrictionStep(AbstractModulated):
+    """Friction that changes at one moment: F = ΔF g(v) 1(t > t_c), g the law `term`.
+
+    `step_time` t_c, s. The step is a straight ramp of `ramp` seconds, so that t_c can be refined;
+    give a length that the recording cannot resolve, or zero.
+    """
+
+    term: AbstractTerm = Coulomb()
+    step_time: Float[Array, ""] | float = UNKNOWN
+    ramp: float = eqx.field(static=True, default=0.0)
+    parameter: ClassVar = Parameter(
+        "step_time", TIME, _within, logarithmic=False, resolution=_MOMENTS
+    )
+    prefix: ClassVar = "step"
+
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        return _stepped(self, time)
+
+    def factor_text(self, s, name):
+        if self.ramp == 0:
+            return s.choose(f"t > {name}", "1.0", "0.0")
+        return s.clip(f"(t - {name}) / {literal(self.ramp)} + 0.5", "0.0", "1.0")
+
+    def extent(self, values):
+        at, half = values["step_time"], self.ramp or 1.0
+        return super().extent(values) | {"time": (at - half, at + half)}
+
+
+def _stepped(step, time):
+    """A ramp of `step.ramp` seconds from zero to one about `step.step_time`, s."""
+    late = time - step.step_time
+    if not isinstance(step.ramp, jax.Array) and step.ramp == 0:
+        return jnp.where(late > 0, jnp.ones_like(late), 0.0)
+    return jnp.clip(late / step.ramp + 0.5, 0.0, 1.0)
+
+
+class PayloadChange(AbstractTerm):
+    """A load that is taken up or put down: F = φ (ΔM a + ΔF), φ(t) = 1(t > t_c).
+
+    It comes and goes with the axis' own speed, so that there is no impulse: φ ΔM a is
+    d/dt(φ ΔM v) − φ̇ ΔM v. `load` holds the laws of what is carried: inertia, and gravity or a
+    constant weight. `step_time` t_c, s; the step is a ramp as in [`FrictionStep`][].
+    """
+
+    load: AbstractTerm = Sum((Inertia(), Offset()))
+    step_time: Float[Array, ""] | float = UNKNOWN
+    ramp: float = eqx.field(static=True, default=0.0)
+    parameter: ClassVar = FrictionStep.parameter
+
+    @property
+    def affine(self):
+        return tuple(p._replace(name=f"payload_{p.name}") for p in self.load.affine)
+
+    @property
+    def nonlinear(self):
+        return (self.parameter,)
+
+    @property
+    def coordinates(self):
+        return self.load.coordinates | {"time"}
+
+    @property
+    def inertial(self) -> bool:
+        return self.load.inertial
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        share, time = _stepped(self, recording.time), recording.time
+        plain = share[:, None] * self.load.columns(recording)
+        if not isinstance(self.ramp, jax.Array) and self.ramp == 0:
+            return plain
+        inside = jnp.abs(time - self.step_time) < 0.5 * self.ramp
+        rate = jnp.where(inside, 1 / self.ramp, 0.0)
+        return plain - rate[:, None] * self.load.momentum(recording)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return _stepped(self, recording.time)[:, None] * self.load.momentum(recording)
+
+    def offset(self, recording: Recording) -> Float[Array, " N"]:
+        return jnp.zeros_like(recording.time)
+
+    def beta(self) -> Float[Array, " d"]:
+        return vector([self.step_time])
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "PayloadChange":
+        return eqx.tree_at(lambda term: term.step_time, self, beta[0])
+
+
+class GainStep(AbstractLaw):
+    """A gain that changes at one moment: u = f + κ f 1(t > t_c), f what the motion needs.
+
+    `step_time` t_c, s; the step is a straight ramp of `ramp` seconds, as in [`FrictionStep`][].
+    """
+
+    step_time: Float[Array, ""] | float = UNKNOWN
+    ramp: float = eqx.field(static=True, default=0.0)
+    affine: ClassVar = (Parameter("step_gain", DIMENSIONLESS),)
+    nonlinear: ClassVar = (FrictionStep.parameter,)
+    coordinates: ClassVar = frozenset({"time", "predicted_force"})
+
+    def law(self, sample: Sample):
+        return (_stepped(self, sample.time) * reading(sample, "predicted_force"),)
+
 
 # A step in friction cannot be dated better than to about one kernel of the weak form, some
 # thousandths of the record.

@@ -1,10 +1,61 @@
 """Extra friction at one place."""
 
-import numpy as np
+from typing import ClassVar
 
-from ..base import AbstractTerm
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ...units import (
+    FORCE,
+    POSITION,
+)
+from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, View
-from ..position import StickySpot
+from ..position import WITH_DIRECTION, shortest, stroke, within
+from ..sample import UNKNOWN, Parameter, Resolution, Sample
+
+
+def _spot_bounds(scales):
+    """From two samples at the top speed to a quarter of the stroke, beyond which it is no spot."""
+    return shortest(scales), 0.25 * stroke(scales)
+
+
+# Two spots one width apart overlap by exp(−1/4) = 0.8; 1.5 points a width and two widths an octave
+# leave no spot without a neighbour that overlaps it by 0.9.
+_BY_WIDTH = Resolution(1, 1.5, None, 96, "spot_width")
+
+
+_WIDTH = Resolution(0, 2, None, 12)
+
+
+class StickySpot(AbstractLaw):
+    """Extra friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
+
+    `spot_position` x₀, m; `spot_width` w, m.
+    """
+
+    spot_position: Float[Array, ""] | float = UNKNOWN
+    spot_width: Float[Array, ""] | float = UNKNOWN
+    sided: ClassVar = True
+    affine: ClassVar = (Parameter("spot_force", FORCE),)
+    nonlinear: ClassVar = (
+        Parameter("spot_position", POSITION, within, logarithmic=False, resolution=_BY_WIDTH),
+        Parameter("spot_width", POSITION, _spot_bounds, resolution=_WIDTH),
+    )
+    coordinates: ClassVar = WITH_DIRECTION
+
+    def law(self, sample: Sample):
+        distance = (sample.position - self.spot_position) / self.spot_width
+        return (jnp.sign(sample.velocity) * jnp.exp(-0.5 * distance**2),)
+
+    def text(self, s, place, width):
+        away = f"((x - {place}) / {width})"
+        return (f"{s.call('sign', 'v')} * {s.call('exp', f'-0.5 * {away} * {away}')}",)
+
+    def extent(self, values):
+        at, reach = values["spot_position"], 4 * values["spot_width"]
+        return {"position": (at - reach, at + reach)}
 
 
 def spots(term: AbstractTerm, view: View) -> np.ndarray:

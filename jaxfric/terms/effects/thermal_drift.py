@@ -1,10 +1,52 @@
 """Friction that falls as the machine warms."""
 
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ...units import (
+    TIME,
+)
 from ..base import AbstractTerm
 from ..effect import Effect
 from ..friction import Coulomb, Viscous
-from ..sample import Scales
-from ..time import ThermalDrift
+from ..sample import UNKNOWN, Parameter, Scales
+from ..text import signed
+from ..time import AbstractModulated
+
+
+def _constant_bounds(scales):
+    """A fiftieth to three times the record.
+
+    Faster warming is over within a tenth of the record. Slower warming falls by x = 1/3 of an
+    exponent at most and differs from a straight line by x/8 = 4 % of that fall.
+    """
+    return 0.02 * scales.duration, 3 * scales.duration
+
+
+class ThermalDrift(AbstractModulated):
+    """Friction that falls as the machine warms: F = β g(v) exp(−(t − t₀)/τ), g the law `term`.
+
+    `time_constant` τ, s; `start` t₀, s, is a given number that only scales β.
+    """
+
+    term: AbstractTerm = Viscous()
+    time_constant: Float[Array, ""] | float = UNKNOWN
+    start: float = eqx.field(static=True, default=0.0)
+    parameter: ClassVar = Parameter("time_constant", TIME, _constant_bounds)
+    prefix: ClassVar = "thermal"
+
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        return jnp.exp(-(time - self.start) / self.time_constant)
+
+    def factor_text(self, s, name):
+        return s.call("exp", f"-(t - {signed(self.start)}) / {name}")
+
+    def extent(self, values):
+        last = self.start + 3 * values["time_constant"]
+        return super().extent(values) | {"time": (self.start, last)}
 
 
 def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:
