@@ -1,5 +1,6 @@
 """An effect from one file, that of CONTRIBUTING.md, is known everywhere at once."""
 
+import ast
 import contextlib
 import importlib.util
 import io
@@ -128,3 +129,28 @@ def test_what_is_there_already_is_refused(file):
     with pytest.raises(ValueError, match="there are values, friction"):
         effects.Effect("ripple", "", "magic")
     assert "ripple" not in effects.EFFECTS and effects.law_named("Latch") is None
+
+
+# Where a literal only looks like an effect: the demo's machine, a joint's spring, and the verb.
+LIKE_ONE, VERB = {("cli/demo.py", "cogging"), ("export/simple.py", "spring")}, "presliding"
+
+
+def test_nothing_outside_its_file_names_an_effect_or_asks_for_its_law():
+    package = Path(jf.__file__).parent
+    laws = {law.__name__ for effect in effects.EFFECTS.values() for law in effect.laws}
+    curves = {"Gaussian", "Lorentzian", "Exponential", "Generalised"}  # of the models, too
+    found = set()
+    for path in package.rglob("*.py"):
+        file = path.relative_to(package).as_posix()
+        # The machines of `prove` and the logs with mistakes say what they conceal.
+        if file.startswith(("terms/", "validation/concealed/", "validation/hunt/")):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and node.value in set(effects.EFFECTS) - {VERB}:
+                found.add((file, node.value))
+            asks = isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance"
+            for part in ast.walk(node) if asks or isinstance(node, ast.Compare) else ():
+                name = getattr(part, "id", getattr(part, "attr", ""))
+                if name in laws - curves:
+                    found.add((file, name))
+    assert found <= LIKE_ONE, sorted(found - LIKE_ONE)
