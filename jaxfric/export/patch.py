@@ -18,6 +18,7 @@ from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
+from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
 from .rerun import Rerun, rerun
@@ -129,7 +130,7 @@ def _put_right(source, joint: str, told: Explanation):
         elif finding.effect == "force_limit" and finding.attribute:
             (limit,) = finding.parameters.values()
             values[finding.attribute] = float("inf"), float(limit.value)
-        elif finding.effect == "transport_delay":
+        elif finding.effect in EFFECTS and EFFECTS[finding.effect].shift:
             delay = float(finding.parameters["delay"].value)
             number = actuator_of(model.mujoco, model.model, model.number)
             if number is None:
@@ -164,7 +165,7 @@ def _acting(told: Explanation) -> tuple[float, float, float]:
     for finding in told.findings:
         if finding.effect == "force_limit":
             limit = float(next(iter(finding.parameters.values())).value)
-        elif finding.effect in ("transport_delay", "actuator_lag"):
+        elif finding.effect in EFFECTS and EFFECTS[finding.effect].late:
             delay = float(next(iter(finding.parameters.values())).value)
     return gain, limit, delay
 
