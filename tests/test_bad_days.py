@@ -16,7 +16,7 @@ from jaxfric import fleet, models, terms
 from jaxfric.cli import commands, main, options
 from jaxfric.data.io import read_with_notes, write_table, write_text
 from jaxfric.data.printable import printable
-from jaxfric.explanation import explaining
+from jaxfric.explanation import holdout
 from jaxfric.fleet import expressions, journal, reading, tables
 from jaxfric.identification import documents
 from jaxfric.identification.documents import to_json
@@ -630,6 +630,6 @@ def test_a_held_out_recording_without_a_position_is_named():
     here, held = a_log(), jf.Recording(time=TIME, force=FORCE, velocity=POSITION, source="held")
     candidate = Namespace(term=terms.Cogging(), effect=Namespace(name="cogging"))
     found = Namespace(taken=[Namespace(trial=Namespace(candidate=candidate))])
-    explaining._check_signals(found, here, here)
+    holdout.check_signals(found, here, here)
     with pytest.raises(ValueError, match="held lacks 'position'"):
-        explaining._check_signals(found, here, held)
+        holdout.check_signals(found, here, held)
