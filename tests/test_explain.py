@@ -956,23 +956,22 @@ def test_a_term_has_to_predict_blocks_that_it_was_not_fitted_to(healthy):
     target[:20] += 20.0 * np.sin(at[:20])
     wave = np.stack([np.sin(at), np.cos(at)], axis=1)
 
-    def left(columns):
-        residual = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-        basis = np.linalg.qr(columns)[0]
-        fit = types.SimpleNamespace(residual=residual, basis=lambda: basis)
-        return float(residual @ residual), intervals.left_out(fit, block)
-
-    one = np.ones((480, 1))
-    less, more = left(one), left(np.hstack([one, wave]))
-    assert more[0] < less[0] and more[1] > less[1]
-    # Against fits done again without each block.
+    one, empty = np.ones((480, 1)), (np.zeros(0),) * 2
     columns = np.hstack([one, wave])
-    power = 0.0
+    alpha = np.linalg.lstsq(columns, target, rcond=None)[0]
+    rest = target - columns @ alpha
+    now = regression.Fit(
+        (None, None), empty, (alpha[:1], alpha[1:]), columns, np.zeros((480, 0)), rest, rest @ rest
+    )
+    found, less = intervals.left_out(now, 1, block), np.sum((target - target.mean()) ** 2)
+    assert now.energy < less < found
+    # Against fits of the wave done again without each block.
+    own, left, power = wave - wave.mean(axis=0), target - target.mean(), 0.0
     for b in range(24):
         kept = block != b
-        alpha = np.linalg.lstsq(columns[kept], target[kept], rcond=None)[0]
-        power += np.sum((target[~kept] - columns[~kept] @ alpha) ** 2)
-    assert more[1] == pytest.approx(power, rel=0.02)
+        part = np.linalg.lstsq(own[kept], left[kept], rcond=None)[0]
+        power += np.sum((left[~kept] - own[~kept] @ part) ** 2)
+    assert found == pytest.approx(power, rel=0.02)
 
 
 def test_all_findings_together_bring_a_model_nearer_to_the_held_out_recording(healthy, monkeypatch):

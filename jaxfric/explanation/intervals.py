@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .regression import Fit
+from .regression import Fit, orthonormal
 
 
 def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
@@ -36,15 +36,21 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def left_out(now: Fit, block: np.ndarray) -> float:
-    """The energy that each block is left with, N², by a fit to all the other blocks.
+def left_out(now: Fit, number: int, block: np.ndarray) -> float:
+    """The energy that blocks are left with, N², by a term that was fitted to all the others.
 
-    To first order in all parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks), each block's
-    pull on the fit bounded as in [`covariance`][].
+    To first order in the term's own parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks);
+    those of the other terms stay as all blocks say. Each block's pull on the fit is bounded as in
+    [`covariance`][].
 
-    **Arguments:** `block`, the number of each row's block, `(J,)`.
+    **Arguments:** `number` of the term; `block`, the number of each row's block, `(J,)`.
     """
-    basis = now.basis()
+    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
+    mine = np.zeros(now.jacobian.shape[1], bool)
+    mine[affine[number] : affine[number + 1]] = True
+    mine[searched[number] : searched[number + 1]] = True
+    basis = orthonormal(now.jacobian[:, mine], orthonormal(now.jacobian[:, ~mine]))
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     power = 0.0
     for a, b in zip(starts, [*starts[1:], len(block)], strict=True):

@@ -118,7 +118,8 @@ def search(
                 # Nothing there has a name, and the base fits these rows as well as it can.
                 betas = (base.betas[0], *now.betas[1:])
                 now = fit(now.terms, evidence, betas, 6) if taken else base
-            return Named(base, now, taken, round_, start=start)
+            # What went again leaves the base as it was, not as it was refitted on the way.
+            return Named(base, now if taken else base, taken, round_, start=start)
         visited.add(names)
         best, rivals = _rivals(_plainer(best, round_), round_, now, evidence)
         trial = _own(best.trial)
@@ -353,7 +354,7 @@ def _pruned(evidence, now, taken, size):
         gain, trial = 1 - now.energy / less.energy, taken[place - start].trial
         idle = trial.score(gain, size) <= 0 or gain < LEAST_SHARE
         if not trial.candidate.effect.momentary:
-            idle |= left_out(now, block) >= left_out(less, block)
+            idle |= left_out(now, place, block) >= less.energy
         if idle:
             now = less
             taken = [t for i, t in enumerate(taken) if i != place - start]
