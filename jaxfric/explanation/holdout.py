@@ -88,24 +88,25 @@ def _measured(better: Improved, asked: Question, figures: Figures) -> Improved:
 
 
 def _rephased(found: Named, asked: Question, rest: Rest) -> tuple[Named, Rest]:
-    """The findings with their waves at another phase there, if only so they are borne out.
+    """The findings, each wave over position at another phase there if only so it is borne out.
 
-    The zero of an incremental encoder is another after each homing, for all waves at once.
+    The zero of an incremental encoder is another after each homing.
     """
     where, left = rest
     start = len(left.last.terms) - len(left.taken)
-    waves = [n for n in range(len(left.taken)) if verification.wavelike(left.last, start + n)]
-    if not waves or all(_borne_out(found, asked, rest, n) for n in waves):
-        return found, rest
+    for number in range(len(left.taken)):
+        wave = verification.wavelike(left.last, start + number)
+        if not wave or _borne_out(found, asked, (where, left), number):
+            continue
+        turned, there = _turned(found, number), _turned(left, number)
+        if _borne_out(turned, asked, (where, there), number):
+            found, left = turned, there
+    return found, (where, left)
 
-    def turned(named: Named) -> Named:
-        taken = [t._replace(rephased=n in waves) for n, t in enumerate(named.taken)]
-        return named._replace(taken=taken)
 
-    again = turned(found), (where, turned(left))
-    if any(_borne_out(again[0], asked, again[1], n) for n in waves):
-        return again
-    return found, rest
+def _turned(named: Named, number: int) -> Named:
+    taken = [t._replace(rephased=t.rephased or n == number) for n, t in enumerate(named.taken)]
+    return named._replace(taken=taken)
 
 
 def _borne_out(found: Named, asked: Question, rest: Rest, number: int) -> bool | None:
