@@ -861,29 +861,25 @@ def beside(asked, term):
     return naming.Named(asked.base, last, [naming.Taken(None, (), 0.002)], None)
 
 
-@pytest.mark.parametrize("inertia", [0.0, 1.0])
-def test_a_finding_that_adds_inertia_has_some(healthy, inertia):
-    asked = question.ask(planted(healthy[0], LOAD, (inertia,)), models.named("gaussian"))
-    idle = [0] if inertia == 0.0 else []
-
-    def weightless(term):
-        return list(plausible.weightless(beside(asked, term).last, 1, asked.evidence, asked.wide))
-
-    assert weightless(LOAD) == idle
-    # Friction adds none, and is not asked for it.
-    assert not weightless(terms.Spring())
+@pytest.mark.parametrize("size", [0.0, 1.0])
+@pytest.mark.parametrize("term", [LOAD, terms.Spring(), terms.FrictionStep(step_time=9.0)])
+def test_a_finding_is_not_nil_within_its_error(healthy, term, size):
+    asked = question.ask(planted(healthy[0], term, (size,)), models.named("gaussian"))
+    found = beside(asked, term).last
+    nil = list(plausible.nil(found, 1, asked.evidence, asked.wide))
+    assert nil == ([0] if size == 0.0 else [])
 
 
-def test_where_a_load_has_no_inertia_other_effects_compete(healthy, monkeypatch):
+def test_where_a_finding_is_nil_others_compete(healthy, monkeypatch):
     run = planted(healthy[0], *CASES["cogging"])
     asked = question.ask(run, models.named("gaussian"))
     known = []
 
-    def weightless(now, count, *_):
+    def nil(now, count, *_):
         known.append(count)
         return iter([0] if len(known) == 1 else [])
 
-    monkeypatch.setattr(naming, "weightless", weightless)
+    monkeypatch.setattr(naming, "nil", nil)
     found = naming.search(asked.evidence, asked.base, asked.field)
     # The form of cogging that went does not come again; another form or effect may.
     assert known and len(found.last.terms) == 1 + len(found.taken)

@@ -15,6 +15,7 @@ from .improvement import Improved, Rest, beside_others, force_errors, lacking
 from .naming import Named
 from .question import Question, beside
 from .regression import Fit
+from .views import estimated
 
 
 def check_signals(found: Named, recording: Recording, holdout: Recording) -> None:
@@ -53,6 +54,10 @@ def confirmed(
     rest: Rest = (beside(where, undone(holdout)) if late else asked, left)
     found, rest = _rephased(better.found, asked, rest)
     borne = [_borne_out(found, asked, rest, n) for n in range(len(found.taken))]
+    borne = [
+        False if b and none else b
+        for b, none in zip(borne, _none_in_both(found, asked, rest), strict=True)
+    ]
     taken = [t._replace(confirmed=b) for t, b in zip(found.taken, borne, strict=True)]
     found = found._replace(taken=taken)
     rest = rest[0], rest[1]._replace(taken=taken[: len(rest[1].taken)])
@@ -119,6 +124,16 @@ def _borne_out(found: Named, asked: Question, rest: Rest, number: int) -> bool |
     less = beside_others(found, rest, asked, number)
     without, with_it = residuals(less, rest, asked, number)
     return verification.nearer(with_it, without)
+
+
+def _none_in_both(found: Named, asked: Question, rest: Rest) -> list[bool]:
+    """Whether each finding's force may as well be none, by what both recordings say of it."""
+    start = len(found.last.terms) - len(found.taken)
+    values = estimated(found, asked, rest)[start:] if found.taken else []
+    return [
+        spelled.may_be_none(term, known)
+        for term, known in zip(found.last.terms[start:], values, strict=True)
+    ]
 
 
 def residuals(less: Fit, rest: Rest, asked: Question, number: int) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from .chance import DRAWS, LEVEL, blocks
 from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence, Motion
 from .intervals import left_out
-from .plausible import machines, weightless
+from .plausible import machines, nil
 from .predictions import with_predictions
 from .question import BETWEEN, Wider
 from .regression import Fit, fast, fit, without
@@ -129,7 +129,7 @@ def search(
         evidence = with_predictions(evidence, now)
         now = fit(terms, evidence, now.betas, 4)
         now, taken = _pruned(evidence, now, taken, round_.size)
-        for number in weightless(now, len(taken), evidence, wider[1]):
+        for number in nil(now, len(taken), evidence, wider[1]):
             refused.add(_form(taken[number].trial.candidate))
             now = without(now, evidence, len(now.terms) - len(taken) + number)
             taken = [t for i, t in enumerate(taken) if i != number]

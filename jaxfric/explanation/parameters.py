@@ -60,6 +60,18 @@ def seen_by(view: Evidence, known: Fit, count: int, units) -> list[dict[str, Est
     return estimates(again, np.arange(len(view.rows)) * count // len(view.rows), units)
 
 
+def may_be_none(term: AbstractTerm, known: dict[str, Estimate]) -> bool:
+    """Whether the intervals of all that its force is proportional to hold zero; of waves, of the
+    amplitudes too.
+    """
+    sizes = (
+        estimate.interval()
+        for name, estimate in known.items()
+        if name.startswith("amplitude") or any(name == p.name for p in term.affine)
+    )
+    return not any(low * high > 0 for low, high in sizes)
+
+
 _wave = programs.compiled(wave)
 
 

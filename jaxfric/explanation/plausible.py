@@ -79,16 +79,12 @@ def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
     return own.inertia <= most["inertia"] and enough
 
 
-def weightless(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
-    """Numbers of the last `count` terms that add inertia, all of which may as well be none.
+def nil(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
+    """Numbers of the last `count` terms all of whose forces may as well be none, the last first.
 
-    Of a load on a spring that leaves its friction, which acts late: another effect, with fewer
-    parameters. The last number comes first. The errors contain what a kernel of twice the width
-    changes, `wide`.
+    The errors contain what a kernel of twice the width changes, `wide`.
     """
     start = len(now.terms) - count
-    if not any(term.inertial for term in now.terms[start:]):
-        return
     units = evidence.motion.unit_names
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     values = spelled.estimates(now, block, units)
@@ -96,13 +92,7 @@ def weightless(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) 
         there = spelled.seen_by(wide, now, int(block[-1]) + 1, units)
         values = [spelled.with_smoothing(*pair) for pair in zip(values, there, strict=True)]
     for number in reversed(range(count)):
-        term, known = now.terms[start + number], values[start + number]
-        sizes = (
-            estimate.interval()
-            for name, estimate in known.items()
-            if name.startswith("amplitude") or any(name == p.name for p in term.affine)
-        )
-        if term.inertial and not any(low * high > 0 for low, high in sizes):
+        if spelled.may_be_none(now.terms[start + number], values[start + number]):
             yield number
 
 
