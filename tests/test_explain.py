@@ -443,6 +443,27 @@ def test_values_that_do_not_carry_over_are_said_to(healthy):
     assert explain(healthy[0]).fit["holdout_refitted_error"] is None
 
 
+@pytest.mark.slow
+def test_values_that_differ_on_the_held_out_recording_are_named(healthy):
+    """The held-out machine has 2 N more of Coulomb friction, beside what is found here."""
+    run = planted(healthy[0], *CASES["cogging"])
+    other = planted(planted(healthy[1], *CASES["cogging"]), terms.Coulomb(), (2.0,))
+    told = explain(run, "gaussian", other)
+    assert [f.effect for f in told.findings] == ["cogging"]
+    values = told.fit["holdout_values"]
+    assert (
+        {"coulomb+", "coulomb-"}
+        <= set(values)
+        <= {*("coulomb+", "coulomb-", "stribeck_force+", "stribeck_force-", "viscous+", "viscous-")}
+    )
+    for name in ("coulomb+", "coulomb-"):
+        apart = values[name]["there"] - values[name]["here"]
+        assert apart == pytest.approx(2.0, abs=4 * values[name]["standard_error"])
+    assert "there coulomb+ is" in told.summary
+    alike = explain(run, "gaussian", planted(healthy[1], *CASES["cogging"]))
+    assert alike.fit["holdout_values"] == {} and "But through" not in alike.summary
+
+
 def test_what_the_motion_has_is_no_tone_but_alone(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
     foreign, own, step = tried(seen)

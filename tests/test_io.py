@@ -508,3 +508,26 @@ def test_delta_servo_and_ur10e():
     assert list(recording.channels) == ["reference"] and recording.velocity is not None
     recording, notes = io.read_with_notes(DATA / "ur10e" / "joint_1.csv")
     assert notes == [] and recording.channels == {} and recording.num_segments == 1
+
+
+@pytest.mark.parametrize(
+    "head, options, said",
+    [
+        (
+            "time,position,current",
+            {},
+            "No unit is named: position as m (else --units position=UNIT)",
+        ),
+        ("time,position,force", {}, "force as N and position as m"),
+        ("time,velocity,force [N]", {}, "position as m"),
+        ("time,position [mm],force [N]", {}, None),
+        ("time,position,torque", {}, None),
+        ("time,position,current", {"units": {"position": "rad"}}, None),
+    ],
+)
+def test_a_unit_that_nothing_names_is_said(tmp_path, head, options, said):
+    path = tmp_path / "log.csv"
+    rows = "\n".join(f"{0.01 * i},{np.sin(i)},{np.cos(i)}" for i in range(20))
+    path.write_text(f"{head}\n{rows}\n")
+    _, notes = io.read_with_notes(path, served=True, **options)
+    assert said in notes[0] if said else "No unit is named" not in notes[0]

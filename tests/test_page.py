@@ -47,7 +47,7 @@ DOCUMENT = {
         "samples": 30000,
         "duration": 30.0,
         "sample_rate": 1000.0,
-        "sha256": "0123abcd",
+        "sha256": "0123abcd" * 8,
         "notes": ["2 samples with no number left out"],
     },
     "baseline": {

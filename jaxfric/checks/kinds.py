@@ -165,7 +165,7 @@ KINDS = (
     Kind(
         "one_direction",
         False,
-        "Only {value:.1%} of the slip is in one of the two directions, so that its friction is an "
+        "One of the two directions has {value:.1%} of the slip, so that its friction is an "
         "extrapolation. Move both ways.",
     ),
     Kind(

@@ -7,6 +7,7 @@ for a role are an error, and a unit in a name is reported or refused but never c
 import re
 from collections.abc import Iterable, Mapping
 
+from ..units import SI
 from .languages import PARTICLES, english, plain
 from .nearest import meant
 from .printable import listed
@@ -101,14 +102,22 @@ def stated_unit(name: str, role: str) -> str | None:
     return next((u for t in tails if len(t) > 1 and (u := unit_of(t, role))), None)
 
 
-def served(chosen: Mapping[str, str], scale: Mapping[str, float]) -> str:
-    """Which column serves as what, and the factors."""
-    said = []
+def served(chosen: Mapping[str, str], scale: Mapping[str, float], named: Mapping[str, str]) -> str:
+    """Which column serves as what, the factors, and the units that nothing names.
+
+    `named`: the units of force and position that are [given or stated][jaxfric.data.columns.units].
+    """
+    pieces = []
     for role, column in chosen.items():
         factor = f" × {scale[role]:g}" if scale.get(role, 1.0) != 1.0 else ""
         name = column if column.isprintable() else repr(column)
-        said.append(f"{role}{f' from {name}' if column != role else ''}{factor}")
-    return f"Columns: {', '.join(said)}."
+        pieces.append(f"{role}{f' from {name}' if column != role else ''}{factor}")
+    roles = {"force": {"force"}, "position": {"position", "velocity"}}
+    taken = [r for r, those in roles.items() if r not in named and those & set(chosen)]
+    default = " and ".join(f"{role} as {SI[role]}" for role in taken)
+    option = ",".join(f"{role}=UNIT" for role in taken)
+    said = f"Columns: {', '.join(pieces)}."
+    return said + f" No unit is named: {default} (else --units {option})." * bool(taken)
 
 
 def unknown_units(chosen: Mapping[str, str], scale: Mapping[str, float]) -> list[str]:

@@ -111,7 +111,8 @@ def read_with_notes(
     if counts_per_rev is not None:
         scale, units = angles(chosen, scale, units, counts_per_rev, source)
     names.check_per_second(chosen, scale, source)
-    notes = [names.served(chosen, scale)] if served else []
+    named = names.units(chosen, scale, units)
+    notes = [names.served(chosen, scale, named)] if served else []
     notes += table.notes + names.unknown_units(chosen, scale)
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
@@ -135,7 +136,7 @@ def read_with_notes(
         mask=tidy.mask,
         segment=tidy.segment,
         channels={role: scaled[role] for role in scaled if role not in _SIGNALS},
-        units=tuple(names.units(chosen, scale, units).items()),
+        units=tuple(named.items()),
         source=source,
         sha256=sha256(path),
     )

@@ -8,10 +8,11 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
-from .baseline import at_values
+from .baseline import SURE, at_values
+from .chance import blocks
 from .evidence import gather, motion_of
 from .figures import Figures, cast
-from .improvement import Improved
+from .improvement import Improved, Rest, with_late
 from .naming import Named
 from .predictions import with_predictions
 from .question import Question
@@ -43,30 +44,61 @@ def document(
         return None if before is None else {"before": before, "after": after}
 
     before, after, reach = better.before, better.after, asked.evidence.reach
-    refitted, filtered_refitted = _refitted(asked, better, figures)
+    refitted = _refitted(asked, better, figures)
     return {
         "force_error": pair(before.here, after.here),
         "holdout_force_error": pair(before.held, after.held),
         "holdout_adjusted": _adjusted(better) if asked.held else None,
-        "holdout_refitted_error": refitted,
+        "holdout_refitted_error": refitted["error"],
+        "holdout_values": refitted.get("values"),
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach),
         "filtered_force_error": filtered["force_error"]
         | {"width": reach, "force_taken_later": asked.delay},
         "filtered_holdout_force_error": filtered["holdout_force_error"],
-        "filtered_holdout_refitted_error": filtered_refitted,
+        "filtered_holdout_refitted_error": refitted["filtered"],
         "filtered_noise_floor": filtered["noise_floor"],
     }
 
 
-def _refitted(asked: Question, better: Improved, figures: Figures):
-    """The baseline's errors on the held-out recording, fitted to it, where nothing was found."""
-    if asked.held is None or better.found.taken:
-        return None, None
-    seen = with_predictions(asked.held, better.first)
-    again = fit(better.first.terms, seen, better.first.betas)
-    model = spelled.model(again, asked.evidence.motion.units)
-    return figures.held(model), verification.error(again, asked.held)
+def _refitted(asked: Question, better: Improved, figures: Figures) -> dict[str, Any]:
+    """What the model leaves of the held-out recording with values of its own, and which these are.
+
+    Named are values of the baseline's terms that differ by more than both recordings leave open.
+    """
+    if asked.held is None:
+        return dict.fromkeys(("error", "filtered"))
+    left, units = better.rest[1], asked.evidence.motion.units
+    held = better.rest[0].held
+    carried = verification.carried(left.last, held, left.rephased)
+    again = fit(carried.terms, with_predictions(held, carried), carried.betas)
+    late = len(better.found.last.terms) - len(left.last.terms)
+    whole = with_late(again, better.found.last, late) if late else again
+    return {
+        "error": figures.held(spelled.model(whole, units)),
+        "filtered": verification.error(again, held),
+        "values": {} if better.found.given else _differing(better.rest, again),
+    }
+
+
+def _differing(rest: Rest, again: Fit) -> dict[str, dict[str, Any]]:
+    """Values of the first term that are others on the held-out recording, here and there."""
+    where, left = rest
+    units = where.evidence.motion.unit_names
+    here = spelled.estimates(left.last, where.block, units)[0]
+    elapsed = where.held.elapsed[where.held.centre]
+    there = spelled.estimates(again, blocks(elapsed, where.held.reach), units)[0]
+    return {
+        name: {
+            "here": float(own.value),
+            "there": float(there[name].value),
+            "standard_error": float(np.hypot(own.standard_error, there[name].standard_error)),
+            "unit": own.unit,
+        }
+        for name, own in here.items()
+        if abs(own.value - there[name].value)
+        > SURE * np.hypot(own.standard_error, there[name].standard_error)
+    }
 
 
 def _adjusted(better: Improved) -> dict[str, list[str]]:

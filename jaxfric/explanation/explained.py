@@ -266,16 +266,31 @@ def _adjusted(fit: Mapping[str, Any]) -> str:
 
 
 def _not_determined(fit: Mapping[str, Any]) -> list[str]:
-    """That this recording does not determine the values that hold on the held-out one."""
+    """That other values hold on the held-out recording, or none that this one determines."""
     refitted = fit.get("filtered_holdout_refitted_error")
     if refitted is None or fit["filtered_holdout_force_error"]["after"] <= ELSEWHERE * refitted:
         return []
+    through = f"{fit['filtered_holdout_force_error']['after']:.2%}"
+    text = (
+        f"But through the search's filter {through} of the held-out force is left, and "
+        f"{refitted:.2%} where the model is fitted to it: "
+    )
+    if values := fit.get("holdout_values"):
+        there = ", ".join(_differs(name, **value) for name, value in values.items())
+        return [
+            f"{text}there {there}. Either the machine changed in between, or no model of this kind "
+            "holds for both motions."
+        ]
     return [
-        f"But the held-out recording is left with {fit['holdout_force_error']['after']:.2%} of "
-        f"its force, and with {fit['holdout_refitted_error']:.2%} where the model is fitted to it: "
-        "this recording does not determine the values that hold there. Identify on one that moves "
-        "like both."
+        f"{text}this recording does not determine the values that hold there. Identify on one that "
+        "moves like both."
     ]
+
+
+def _differs(name: str, here: float, there: float, standard_error: float, unit: str) -> str:
+    digits = max(0, 1 - math.floor(math.log10(2 * standard_error)))
+    unit = f" {unit}" if unit not in ("", "1") else ""
+    return f"{name} is {there:.{digits}f} instead of {here:.{digits}f}{unit}"
 
 
 # Other values of the same model leave less than half of a held-out recording's error, a quarter of

@@ -99,6 +99,7 @@ def explain(
     theirs, more = (None, []) if holdout is None else inspected(holdout)
     # A few thousand rows: single precision would save nothing.
     with jax.enable_x64(True), threads.single():
+        more = [each._replace(text=f"On the held-out recording: {each.text}") for each in more]
         held, remarks = None if theirs is None else cast(theirs), [*remarks, *more]
         remarks = remarks if looked is None else looked.remarks(remarks)
         told = _explain(

@@ -114,11 +114,11 @@ def elsewhere(found: Named, rest: Rest, units) -> Model:
     there = verification.carried(left.last, where.held, left.rephased)
     late = len(found.last.terms) - len(left.last.terms)
     if late:
-        there = _with_late(there, found.last, late)
+        there = with_late(there, found.last, late)
     return spelled.model(there, units)
 
 
-def _with_late(now: Fit, last: Fit, count: int) -> Fit:
+def with_late(now: Fit, last: Fit, count: int) -> Fit:
     """A fit and the last terms of another one."""
     return now._replace(
         terms=(*now.terms, *last.terms[-count:]),
