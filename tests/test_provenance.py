@@ -56,6 +56,27 @@ def test_a_recording_of_no_file_has_no_hash(axis):
     assert sha256("/dev/null") == "" and sha256("") == ""
 
 
+@pytest.mark.slow
+def test_every_document_says_what_it_was_made_from(axis, tmp_path, capsys):
+    model, out = tmp_path / "model.json", tmp_path / "out.json"
+    assert main(["identify", str(axis), *MODEL, "--save", str(model)]) == 0
+    limits = "--position 0.1 --velocity 0.1 --acceleration 1 --jerk 20".split()
+    motion = str(tmp_path / "motion.csv")
+    lines = {
+        "jaxfric.design/1": (model, ["design", str(model), *limits, "-o", motion]),
+        "jaxfric.selection/1": (axis, ["select", str(axis)]),
+        "jaxfric.benefit/1": (
+            model,
+            ["simulate", str(model), motion, "--compensate", "-o", str(tmp_path / "run.csv")],
+        ),
+    }
+    for schema, (file, line) in lines.items():
+        assert main([*line, "--json", str(out)]) == 0, capsys.readouterr().err
+        document = json.loads(out.read_text())
+        assert document["schema"] == schema and set(document["versions"]) == set(LIBRARIES)
+        assert document["made_from"][0] == {"file": str(file), "sha256": sha256(file)}
+
+
 def test_the_effects_say_by_which_version(capsys):
     assert main(["effects", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["versions"] == versions()

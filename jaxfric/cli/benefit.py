@@ -27,8 +27,10 @@ def simulated(model: Model, reference: Recording, controller, notes, arguments) 
     by = arguments.compensate or "the model itself"
     columns = {"time": found.run.time, "force": found.run.force, "position": found.run.position}
     if arguments.json:
-        document = {"schema": "jaxfric.benefit/1", "units": units, "assumed": ASSUMED}
-        put(arguments.json, documents.to_json(document | as_dict(found)))
+        files = arguments.model, arguments.file, arguments.compensate
+        document = documents.made("jaxfric.benefit/1", *files)
+        document |= {"units": units, "assumed": ASSUMED} | as_dict(found)
+        put(arguments.json, documents.to_json(document))
     summary = f"{found.run.num_samples} samples with compensation by {by}\n{told(found, units)}"
     put_table(arguments.out, columns | found.run.channels, notes, f"{summary}\n{ASSUMED}")
     return 0

@@ -104,7 +104,8 @@ def selection(arguments: Namespace) -> int:
             say(f"jaxfric select: {message(error)}", file=sys.stderr)
             failures += 1
             continue
-        done.append({"file": path, "notes": notes} | found.to_dict())
+        made = documents.made("jaxfric.selection/1", path)
+        done.append(made | {"file": path, "notes": notes} | found.to_dict())
         if not _printed(arguments):
             say(
                 text([[f"{path}: {stated(recording)}", *notes], *tabulate.standings(done[-1])])

@@ -45,7 +45,8 @@ def run(arguments: Namespace) -> int:
     else:
         put_table(arguments.out, columns, [], f"{motion.time.size} samples")
     if arguments.json:
-        put(arguments.json, documents.to_json(found.to_dict()))
+        made = documents.made("jaxfric.design/1", arguments.model)
+        put(arguments.json, documents.to_json(made | found.to_dict()))
     if not quiet and not standard(arguments.out):
         say(text(_told(found, dict(model.units)["force"])))
     return 0

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..data.printable import json_text
-from ..data.provenance import versions
+from ..data.provenance import sha256, versions
 from ..data.recording import Recording, uniform
 from ..data.summary import facts
 from ..models import name_of
@@ -86,6 +86,12 @@ def saved(model: Any, *recordings: Recording | None) -> dict[str, Any]:
         if each is not None
     ]
     return model.to_dict() | {"made_from": files, "versions": versions()}
+
+
+def made(schema: str, *paths: str | None) -> dict[str, Any]:
+    """What begins a document: its schema, the files it was made from, and by which versions."""
+    files = [{"file": path, "sha256": sha256(path) or None} for path in paths if path]
+    return {"schema": schema, "made_from": files, "versions": versions()}
 
 
 def open_ends(found: Any) -> dict[str, float]:
