@@ -19,6 +19,7 @@ from jaxfric.explanation import (
     evidence,
     explain,
     holdout,
+    improvement,
     intervals,
     lines,
     locate,
@@ -873,6 +874,22 @@ def test_the_held_out_recording_chooses_nothing(healthy):
     assert document["not_confirmed"][0]["confirmed"] is False
     errors = document["fit"]["holdout_force_error"]
     assert errors["after"] == errors["before"]
+
+
+@pytest.mark.slow
+def test_what_belongs_to_a_moment_stays_where_only_the_base_moved(healthy, monkeypatch):
+    """Another recording says nothing of it; what was refitted beside it, and is worse, goes."""
+    pushes = terms.DisturbancePulses((6.3, 14.2), 0.15)
+    run = planted(healthy[0], pushes, (8.0, -8.0))
+    changed = lambda own, was, _: ["held"] if own.held not in (None, was.held) else []  # noqa: E731
+    monkeypatch.setattr(improvement.Errors, "worse", changed)
+    told = explain(run, "gaussian", healthy[1])
+    assert [f.effect for f in told.findings] == ["disturbance_pulses"]
+    error = told.fit["holdout_force_error"]
+    assert error["after"] == error["before"]
+    assert told.fit["force_error"]["after"] < 0.7 * told.fit["force_error"]["before"]
+    for name, value in told.baseline.parameters.items():
+        assert float(told.model.parameters[name]) == pytest.approx(float(value), rel=1e-12)
 
 
 def beside(asked, term):

@@ -9,6 +9,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..simulation.prediction import delay_of
 from . import parameters as spelled, verification
+from .baseline import as_given
 from .evidence import Motion
 from .figures import Figures
 from .improvement import Improved, Rest, beside_others, force_errors, lacking
@@ -73,12 +74,30 @@ def confirmed(
             found, rest = lacking(found, rest, asked, number)
         better = better._replace(found=found, rest=rest, refuted=lasting)
         better = _measured(better, asked, figures)
+    if found.taken and better.after.worse(better.before, figures.rounding):
+        better = _measured(_base_kept(better, asked), asked, figures)
     if better.after.worse(better.before, figures.rounding):
         base = found._replace(last=better.first, taken=[])
         every = tuple(range(len(taken)))
         better = better._replace(found=base, rest=(asked, base), refitted=False, refuted=every)
         better = _measured(better, asked, figures)
     return better, asked
+
+
+def _base_kept(better: Improved, asked: Question) -> Improved:
+    """What belongs to a moment, beside the base at its own values.
+
+    Of a moment the held-out recording says nothing; of the values that were refitted beside it, it
+    says that they hold no better there.
+    """
+    model = spelled.model(better.first, asked.evidence.motion.units)
+
+    def kept(found: Named, question: Question) -> Named:
+        last = as_given(model, found.last, question.evidence)
+        return found._replace(last=last, given=model, free=())
+
+    where, left = better.rest
+    return better._replace(found=kept(better.found, asked), rest=(where, kept(left, where)))
 
 
 def _measured(better: Improved, asked: Question, figures: Figures) -> Improved:
