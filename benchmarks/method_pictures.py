@@ -11,8 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from jaxfric.cli.demo import EFFECT, SEED, SIZE
-from jaxfric.explanation import chance, evidence, question, regression, reversals
+from jaxfric.explanation import chance, evidence, regression, reversals
 from jaxfric.explanation.predictions import with_predictions
+from jaxfric.explanation.problem import problem_of
 from jaxfric.models import named
 from jaxfric.validation import concealed
 
@@ -25,24 +26,24 @@ def save(figure, name):
     figure.savefig(FOLDER / f"{name}.svg", metadata={"Date": None}, bbox_inches="tight")
 
 
-def rows(asked, machine):
+def rows(problem, machine):
     """What the base leaves, against position, and the force that was concealed."""
-    seen, truth = asked.evidence, machine.truth[EFFECT]
+    seen, truth = problem.evidence, machine.truth[EFFECT]
     x = np.asarray(seen.motion.position)[seen.centre]
     kept = np.abs(x - np.median(x)) < 1.5 * truth["pitch"]
     figure, axis = plt.subplots(figsize=(6.4, 2.6))
     some = np.flatnonzero(kept)[::2]
-    axis.plot(1e3 * x[some], asked.base.residual[some], ".", ms=2, label="rows in slip")
+    axis.plot(1e3 * x[some], problem.base.residual[some], ".", ms=2, label="rows in slip")
     axis.set(xlabel="position, mm", ylabel="residual of the base, N")
     axis.legend(frameon=False, loc="upper right")
     save(figure, "rows")
 
 
-def draws(asked):
+def draws(problem):
     """The best of all candidates by chance, and the gain of the winner."""
-    seen = with_predictions(asked.evidence, asked.base)
-    field = asked.field
-    judge = chance.Judge(asked.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
+    seen = with_predictions(problem.evidence, problem.base)
+    field = problem.candidate_set
+    judge = chance.Judge(problem.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
     scans = [
         judge(field.columns(candidate, seen), candidate.effect.positive)
         for candidate in field.candidates
@@ -81,9 +82,9 @@ def main():
     plt.switch_backend("svg")
     plt.rcParams |= {"svg.fonttype": "none", "font.size": 9, "svg.hashsalt": "jaxfric"}
     machine = concealed.draw(SEED, (EFFECT,), SIZE)
-    asked = question.ask(concealed.record(machine).recording, named(machine.baseline))
-    rows(asked, machine)
-    draws(asked)
+    problem = problem_of(concealed.record(machine).recording, named(machine.baseline))
+    rows(problem, machine)
+    draws(problem)
     turns()
 
 

@@ -38,7 +38,7 @@ from jaxfric.data.io import write_text
 from jaxfric.explanation import verification
 from jaxfric.explanation.contest import contest
 from jaxfric.explanation.predictions import with_predictions
-from jaxfric.explanation.question import ask, beside, opened
+from jaxfric.explanation.problem import across_reversals, problem_of, with_holdout
 from jaxfric.validation import concealed
 from jaxfric.validation.proof.counting import middle, rate
 from jaxfric.validation.proof.planning import PATTERN
@@ -90,29 +90,29 @@ def judge(sealed, wanted):
     run = concealed.record(machine)
     structure = models.named(machine.baseline)
     recording, holdout = (dataclasses.replace(r, source="") for r in (run.recording, run.holdout))
-    asked = ask(recording, structure)
-    asked = beside(opened(recording, asked) or asked, holdout)
+    problem = problem_of(recording, structure)
+    problem = with_holdout(across_reversals(recording, problem) or problem, holdout)
     found = {}
     if set(wanted) & set(methods.SELECTING):
-        found |= select(asked, recording, [m for m in wanted if m in methods.SELECTING])
+        found |= select(problem, recording, [m for m in wanted if m in methods.SELECTING])
     if RANKING in wanted:
-        seen = with_predictions(asked.evidence, asked.base)
-        trials = contest(seen, asked.base, asked.field).trials
+        seen = with_predictions(problem.evidence, problem.base)
+        trials = contest(seen, problem.base, problem.candidate_set).trials
         best = max(trials, key=lambda trial: trial.gain).candidate.effect.name
         found[RANKING] = {"named": [[best]], "after": None}
-    return found | predict(asked, [m for m in wanted if m in methods.PREDICTING])
+    return found | predict(problem, [m for m in wanted if m in methods.PREDICTING])
 
 
-def select(asked, recording, wanted):
+def select(problem, recording, wanted):
     """What the methods that select columns take, and what a refit with it leaves when held out."""
     x, t = np.asarray(recording.position), np.asarray(recording.time)
     scales = x.min(), np.ptp(x), t[0], np.ptp(t)
-    views = asked.evidence, asked.held
+    views = problem.evidence, problem.held
     bases = [
         np.concatenate(
             [
-                with_predictions(view, asked.base).columns(term, beta[None])[0]
-                for term, beta in zip(asked.base.terms, asked.base.betas, strict=True)
+                with_predictions(view, problem.base).columns(term, beta[None])[0]
+                for term, beta in zip(problem.base.terms, problem.base.betas, strict=True)
             ],
             axis=1,
         )
@@ -131,17 +131,17 @@ def select(asked, recording, wanted):
     return found
 
 
-def predict(asked, wanted):
+def predict(problem, wanted):
     """What the methods that name nothing leave when held out."""
-    lefts = [verification.residual(asked.base, view) for view in (asked.evidence, asked.held)]
+    lefts = [verification.residual(problem.base, view) for view in (problem.evidence, problem.held)]
     seen, held = (
         methods.signals(view, view.target - left)
-        for view, left in zip((asked.evidence, asked.held), lefts, strict=True)
+        for view, left in zip((problem.evidence, problem.held), lefts, strict=True)
     )
     found = {}
     for name in wanted:
         rest = lefts[1] - methods.PREDICTING[name](seen, lefts[0], held)
-        found[name] = {"named": None, "after": relative(rest, asked.held)}
+        found[name] = {"named": None, "after": relative(rest, problem.held)}
     return found
 
 

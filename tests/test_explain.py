@@ -28,7 +28,7 @@ from jaxfric.explanation import (
     parameters,
     plausible,
     predictions,
-    question,
+    problem,
     regression,
     telling,
     timing,
@@ -243,9 +243,9 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
     gaussian = models.named("gaussian")
 
     def overlooked(run):
-        asked = question.ask(run, gaussian)
-        nothing = naming.Named(asked.base, asked.base, [], contest.Contest([], [], 200.0))
-        return timing.overlooked(run, asked, nothing)
+        posed = problem.problem_of(run, gaussian)
+        nothing = naming.Named(posed.base, posed.base, [], contest.Contest([], [], 200.0))
+        return timing.overlooked(run, posed, nothing)
 
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -30))
     lateness = overlooked(jax.tree.map(lambda x: x[:-32], run))
@@ -260,8 +260,8 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
 def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -10))
     run = jax.tree.map(lambda x: x[:-12], run)
-    asked = question.ask(run, models.named("gaussian"))
-    undoing = timing._Undoing(run, asked, asked.base)
+    posed = problem.problem_of(run, models.named("gaussian"))
+    undoing = timing._Undoing(run, posed, posed.base)
     delay = EFFECTS["transport_delay"].undone
     found = [undoing.least(delay, guess) for guess in (3e-3, 9.5e-3, 30e-3)]
     times = [time for _, time in found]
@@ -271,9 +271,9 @@ def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
 
 
 def test_of_the_rest_only_noise_is_made_up_for_what_undoing_a_lag_takes_of_it(healthy):
-    asked = question.ask(healthy[0], models.named("gaussian"))
-    undoing = timing._Undoing(healthy[0], asked, asked.base)
-    lag, width, time = EFFECTS["actuator_lag"].undone, asked.evidence.width, 8e-3
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    undoing = timing._Undoing(healthy[0], posed, posed.base)
+    lag, width, time = EFFECTS["actuator_lag"].undone, posed.evidence.width, 8e-3
     taken = undoing.hiss(timing._as_it_is, 0.0, width) / undoing.hiss(lag, time, width)
     sizes = []
     for undoing.power in (0.0, np.inf):
@@ -344,12 +344,13 @@ def test_a_tone_returns_in_another_recording_at_any_phase(healthy):
     term, alpha, beta = CASES["periodic_disturbance"]
     run = planted(healthy[0], term, alpha, beta)
     held = [planted(healthy[1], term, other, beta) for other in ((-1.0, -2.0), (0.5, 1.0))]
-    asked = [question.beside(question.ask(run, models.gaussian()), each) for each in held]
-    found = naming.search(asked[0].evidence, asked[0].base, asked[0].field)
+    alone = problem.problem_of(run, models.gaussian())
+    posed = [problem.with_holdout(alone, each) for each in held]
+    found = naming.search(posed[0].evidence, posed[0].base, posed[0].candidate_set)
     assert found.names == {"periodic_disturbance"}
-    before, after = (verification.error(now, asked[0].held) for now in (found.base, found.last))
+    before, after = (verification.error(now, posed[0].held) for now in (found.base, found.last))
     assert after < 0.3 * before
-    before, after = (verification.error(now, asked[1].held) for now in (found.base, found.last))
+    before, after = (verification.error(now, posed[1].held) for now in (found.base, found.last))
     assert after == pytest.approx(before, rel=0.1)
 
 
@@ -486,10 +487,10 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
     rates, tone = 0.7 * (1 + np.random.default_rng(0).uniform(0, 2.5, 5)), "periodic_disturbance"
 
     def named(run):
-        asked = question.ask(run, models.named("gaussian"))
-        mine = [c for c in asked.field.candidates if c.effect.name == tone]
-        asked.field.candidates = mine
-        return naming.search(asked.evidence, asked.base, asked.field).taken
+        posed = problem.problem_of(run, models.named("gaussian"))
+        mine = [c for c in posed.candidate_set.candidates if c.effect.name == tone]
+        posed.candidate_set.candidates = mine
+        return naming.search(posed.evidence, posed.base, posed.candidate_set).taken
 
     alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
     (found,) = named(alone)
@@ -502,16 +503,16 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
 def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeypatch):
     structure = models.named("gaussian")
     run = planted(healthy[0], terms.PeriodicDisturbance(), (0.3, 0.4), (31.37,))
-    asked = question.ask(run, structure)
+    posed = problem.problem_of(run, structure)
     monkeypatch.setattr(tones, "line_frequencies", lambda *_: np.array([5.0, 20.0]))
-    found = tones.fast_tone(asked.evidence, asked.base)
+    found = tones.fast_tone(posed.evidence, posed.base)
     assert np.min(np.abs(found - 31.37)) < 0.02 and np.ptp(found) < 0.1
     # Noise has none, and what a fit leaves of a tone that it knows has none at that place.
-    quiet = question.ask(healthy[0], structure)
+    quiet = problem.problem_of(healthy[0], structure)
     assert not len(tones.fast_tone(quiet.evidence, quiet.base))
     known = (terms.PeriodicDisturbance(), np.array([31.37]))
-    both = regression.fit([structure, known[0]], asked.evidence, [asked.base.betas[0], known[1]], 2)
-    assert not len(tones.fast_tone(asked.evidence, both))
+    both = regression.fit([structure, known[0]], posed.evidence, [posed.base.betas[0], known[1]], 2)
+    assert not len(tones.fast_tone(posed.evidence, both))
 
 
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
@@ -527,16 +528,16 @@ def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
 def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, monkeypatch):
     term, alpha, beta = CASES["cogging"]
     run = planted(healthy[0], term, alpha, beta)
-    asked = question.ask(run, models.named("gaussian"))
-    monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (asked.base, []))
-    found = naming.search(asked.evidence, asked.base, asked.field)
+    posed = problem.problem_of(run, models.named("gaussian"))
+    monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (posed.base, []))
+    found = naming.search(posed.evidence, posed.base, posed.candidate_set)
     assert found.taken == []
 
 
 def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     term, alpha, beta = CASES["friction_step"]
     found = explain(planted(healthy[0], term, alpha, beta), "gaussian")
-    base = question.ask(healthy[0], models.named("gaussian")).base
+    base = problem.problem_of(healthy[0], models.named("gaussian")).base
     places = telling._everywhere([], found.findings, base)
     assert [place["coordinate"] for place in places] == [EFFECTS["friction_step"].coordinates[0]]
     assert places[0]["share"] == found.findings[0].share and places[0]["size"] > 0
@@ -598,22 +599,22 @@ def finalist(term):
 @pytest.mark.parametrize(("inertia", "is_one"), [(1.0, True), (12.0, False)])
 def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
     run = planted(healthy[0], LOAD, (inertia,))
-    asked = question.ask(run, models.named("gaussian"))
+    posed = problem.problem_of(run, models.named("gaussian"))
     load, beta = finalist(LOAD)
-    load.betas = (*asked.base.betas, beta)
-    assert plausible.plausible(load, asked.base, asked.evidence) is is_one
+    load.betas = (*posed.base.betas, beta)
+    assert plausible.plausible(load, posed.base, posed.evidence) is is_one
 
 
 def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
-    asked = question.ask(healthy[0], models.named("gaussian"))
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
     term, trial = terms.ElasticBacklash(), types.SimpleNamespace(threshold=0.1)
     trial.score, trial.candidate = (lambda gain, _: 100 * gain), types.SimpleNamespace(term=term)
     # Friction of 8 N that coasts at 1 m/s² belongs to 8 kg; the machine has 5.
     for friction, coasting, kept in ((8.0, 4.0, 4.0), (8.0, 1.0, 1.6), (80.0, 10.0, None)):
         beta = np.array([2e-4, 1e-4, coasting])
-        force = evidence.Evidence.columns(asked.evidence, term, beta[None])[0] @ [friction]
-        seen = asked.evidence._replace(target=asked.evidence.target + force)
-        now = regression.fit([asked.structure], seen, asked.base.betas[:1], 0)
+        force = evidence.Evidence.columns(posed.evidence, term, beta[None])[0] @ [friction]
+        seen = posed.evidence._replace(target=posed.evidence.target + force)
+        now = regression.fit([posed.structure], seen, posed.base.betas[:1], 0)
         alpha, betas = np.array([friction]), (*now.betas, beta)
         found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, betas, alpha)
         round_ = plausible.machines(contest.Contest([], [found], 100.0), now, seen)
@@ -636,24 +637,24 @@ def test_what_lags_is_a_curve_that_is_there(healthy):
         ("gaussian", 60.0, False),  # more than all the friction there is
     ):
         run = planted(healthy[0], lag.trial.candidate.term, (force,))
-        asked = question.ask(run, models.named(name))
-        lag.betas = (*asked.base.betas, beta)
-        assert plausible.plausible(lag, asked.base, asked.evidence) is there
+        posed = problem.problem_of(run, models.named(name))
+        lag.betas = (*posed.base.betas, beta)
+        assert plausible.plausible(lag, posed.base, posed.evidence) is there
 
 
 def test_a_load_that_rests_is_a_spring_to_the_ground(healthy):
-    asked = question.ask(healthy[0], models.named("gaussian"))
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
     load, beta = finalist(terms.DryCompliance(0.5, 0.2, 2.0))
-    load.betas = (*asked.base.betas, beta)
-    assert not plausible.plausible(load, asked.base, asked.evidence)
+    load.betas = (*posed.base.betas, beta)
+    assert not plausible.plausible(load, posed.base, posed.evidence)
 
 
 def test_a_held_out_recording_of_another_rate_is_seen_through_the_same_kernel(healthy):
-    asked = question.ask(healthy[0], models.named("gaussian"))
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
     slower = jax.tree.map(lambda x: x[::3], healthy[1])
-    held = question.beside(asked, slower).held
-    assert held.reach == pytest.approx(asked.evidence.reach, rel=0.2)
-    assert held.limits.interval == pytest.approx(3 * asked.evidence.limits.interval, rel=1e-6)
+    held = problem.with_holdout(posed, slower).held
+    assert held.reach == pytest.approx(posed.evidence.reach, rel=0.2)
+    assert held.limits.interval == pytest.approx(3 * posed.evidence.limits.interval, rel=1e-6)
 
 
 def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
@@ -661,23 +662,23 @@ def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
     run = planted(healthy[0], term, alpha, beta)
     structure = models.named("gaussian")
     for held, there in ((planted(healthy[1], term, alpha, beta), True), (healthy[1], False)):
-        asked = question.beside(question.ask(run, structure), held)
-        seen = predictions.with_predictions(asked.evidence, asked.base)
-        places = {place.coordinate: place for place in locate.locate(seen, asked.base)}
+        posed = problem.with_holdout(problem.problem_of(run, structure), held)
+        seen = predictions.with_predictions(posed.evidence, posed.base)
+        places = {place.coordinate: place for place in locate.locate(seen, posed.base)}
         spot = places["position_by_direction"]
         assert spot.p_value <= 0.01 and spot.share > 0.1
-        assert (telling._lasting([spot], asked.base, asked) == [spot]) is there
+        assert (telling._lasting([spot], posed.base, posed) == [spot]) is there
 
 
 def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(healthy):
     """Of the places of the narrow rows, the wide ones keep the curve that is there."""
-    run, asked = healthy[0], question.ask(healthy[0], models.named("gaussian"))
+    run, posed = healthy[0], problem.problem_of(healthy[0], models.named("gaussian"))
     pull = 2 * np.tanh(np.gradient(np.gradient(np.asarray(run.position), TIME), TIME))
-    pulled = question.ask(
+    pulled = problem.problem_of(
         dataclasses.replace(run, force=run.force + pull), models.named("gaussian")
     )
     judged = {}
-    for name, of in (("healthy", asked), ("pulled", pulled)):
+    for name, of in (("healthy", posed), ("pulled", pulled)):
         seen = predictions.with_predictions(of.evidence, of.base)
         places = [p for p in locate.locate(seen, of.base) if p.coordinate in locate.NOISY]
         assert {p.coordinate for p in places} == locate.NOISY
@@ -727,25 +728,25 @@ def test_the_map_of_a_late_force_is_over_its_rate(healthy):
 
 def test_a_moment_counts_on_a_recording_in_which_it_returns(healthy):
     gaussian, step, spot = models.named("gaussian"), CASES["friction_step"], CASES["sticky_spot"]
-    known = question.beside(question.ask(healthy[0], gaussian), healthy[1])
+    known = problem.with_holdout(problem.problem_of(healthy[0], gaussian), healthy[1])
     noise = np.std(verification.residual(known.base, known.held))
     run, again = (planted(planted(r, *spot), *step) for r in healthy)
     for held in (again, planted(healthy[1], *spot)):
-        asked = question.beside(question.ask(run, gaussian), held)
-        betas = [*asked.base.betas, np.array(step[2]), np.array(spot[2])]
-        more = regression.fit([*asked.base.terms, step[0], spot[0]], asked.evidence, betas)
-        less = regression.without(more, asked.evidence, 2)
-        left, right = verification.residuals(less, more, (asked.held,) * 2, frozenset())
+        posed = problem.with_holdout(problem.problem_of(run, gaussian), held)
+        betas = [*posed.base.betas, np.array(step[2]), np.array(spot[2])]
+        more = regression.fit([*posed.base.terms, step[0], spot[0]], posed.evidence, betas)
+        less = regression.without(more, posed.evidence, 2)
+        left, right = verification.residuals(less, more, (posed.held,) * 2, frozenset())
         assert np.std(right) < 1.5 * noise < np.std(left)
 
 
 def test_what_the_held_out_recording_did_not_record_is_not_asked(healthy):
     """A load cell on one of two runs: no error, and the place stays."""
     run = dataclasses.replace(healthy[0], channels={"load": jnp.sin(3.0 * healthy[0].time)})
-    asked = question.beside(question.ask(run, models.named("gaussian")), healthy[1])
-    seen = predictions.with_predictions(asked.evidence, asked.base)
-    places = {place.coordinate: place for place in locate.locate(seen, asked.base)}
-    assert telling._lasting([places["load"]], asked.base, asked) == [places["load"]]
+    posed = problem.with_holdout(problem.problem_of(run, models.named("gaussian")), healthy[1])
+    seen = predictions.with_predictions(posed.evidence, posed.base)
+    places = {place.coordinate: place for place in locate.locate(seen, posed.base)}
+    assert telling._lasting([places["load"]], posed.base, posed) == [places["load"]]
 
 
 def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
@@ -765,37 +766,37 @@ def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     gaussian = models.named("gaussian")
     motion = evidence.motion_of(healthy[0])
     seen = evidence.gather(motion)
-    field = candidates.Field(seen, gaussian)
-    assert field.serves(evidence.gather(motion, seen.width, delay=3e-4))
-    assert not field.serves(evidence.gather(motion, 2 * seen.width))
-    assert not field.serves(evidence.gather(evidence.motion_of(healthy[1]), seen.width))
-    first = question.ask(healthy[0], gaussian)
-    again = question.ask(healthy[0], gaussian, first.base, first)
-    assert again.field is first.field
+    columns_of = candidates.CandidateSet(seen, gaussian)
+    assert columns_of.serves(evidence.gather(motion, seen.width, delay=3e-4))
+    assert not columns_of.serves(evidence.gather(motion, 2 * seen.width))
+    assert not columns_of.serves(evidence.gather(evidence.motion_of(healthy[1]), seen.width))
+    first = problem.problem_of(healthy[0], gaussian)
+    again = problem.problem_of(healthy[0], gaussian, first.base, first)
+    assert again.candidate_set is first.candidate_set
 
 
-def test_a_question_that_cannot_be_put_leaves_no_work_behind(healthy, monkeypatch):
-    fields = []
+def test_a_problem_that_cannot_be_set_up_leaves_no_work_behind(healthy, monkeypatch):
+    made = []
 
-    def field(*arguments):
-        fields.append(candidates.Field(*arguments))
-        return fields[-1]
+    def columns_of(*arguments):
+        made.append(candidates.CandidateSet(*arguments))
+        return made[-1]
 
     def fails(*arguments):
         raise ValueError("too short")
 
-    monkeypatch.setattr(question, "Field", field)
-    monkeypatch.setattr(question, "_aligned", fails)
+    monkeypatch.setattr(problem, "CandidateSet", columns_of)
+    monkeypatch.setattr(problem, "_aligned", fails)
     with pytest.raises(ValueError, match="too short"):
-        question.ask(healthy[0], models.named("gaussian"))
-    assert any(columns.cancelled() for columns in fields[0]._kept.values())
+        problem.problem_of(healthy[0], models.named("gaussian"))
+    assert any(columns.cancelled() for columns in made[0]._kept.values())
 
 
 def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healthy, monkeypatch):
-    asked = question.ask(healthy[0], models.named("gaussian"))
-    assert asked.wide is not None
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    assert posed.wide is not None
     monkeypatch.setattr("jaxfric.explanation.chance.FEWEST", 10_000)
-    assert question._wider(evidence.motion_of(healthy[0]), asked.evidence) is None
+    assert problem._wider(evidence.motion_of(healthy[0]), posed.evidence) is None
 
 
 def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
@@ -803,9 +804,9 @@ def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
     scanned = evidence.gather(evidence.motion_of(healthy[0]))
     pitch = 1 / (1.5 * lines.line_frequencies(scanned, "position")[-1])
     run = planted(healthy[0], terms.Cogging(), (3.0, 1.0), (pitch,))
-    asked = question.ask(run, gaussian)
-    seen = predictions.with_predictions(asked.evidence, asked.base)
-    best = contest.contest(seen, asked.base, asked.field).finalists[0]
+    posed = problem.problem_of(run, gaussian)
+    seen = predictions.with_predictions(posed.evidence, posed.base)
+    best = contest.contest(seen, posed.base, posed.candidate_set).finalists[0]
     assert best.trial.candidate.effect.name == "cogging"
     assert best.trial.candidate.term.harmonics == 1
     assert best.p_value <= contest.LEVEL
@@ -843,11 +844,11 @@ def test_the_moments_of_pushes_have_their_price():
 
 
 def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
-    asked = question.ask(healthy[0], models.named("gaussian"))
-    floor = regression.fast(asked.base)
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    floor = regression.fast(posed.base)
     empty = (np.zeros(0), np.zeros(0))
     wandering = [locate.Place("time", 0.2, f * floor, 0.002, np.nan, empty) for f in (0.9, 1.1)]
-    assert telling._lasting(wandering, asked.base, asked) == wandering[1:]
+    assert telling._lasting(wandering, posed.base, posed) == wandering[1:]
 
 
 def test_the_held_out_recording_chooses_nothing(healthy):
@@ -892,25 +893,25 @@ def test_what_belongs_to_a_moment_stays_where_only_the_base_moved(healthy, monke
         assert float(told.model.parameters[name]) == pytest.approx(float(value), rel=1e-12)
 
 
-def beside(asked, term):
+def beside(posed, term):
     """A search that has found that term, fitted beside the base, and what it is taken to be."""
-    betas = (*asked.base.betas, np.asarray(term.beta()))
-    last = regression.fit((*asked.base.terms, term), asked.evidence, betas, 0)
-    return naming.Named(asked.base, last, [naming.Taken(None, (), 0.002)], None)
+    betas = (*posed.base.betas, np.asarray(term.beta()))
+    last = regression.fit((*posed.base.terms, term), posed.evidence, betas, 0)
+    return naming.Named(posed.base, last, [naming.Taken(None, (), 0.002)], None)
 
 
 @pytest.mark.parametrize("size", [0.0, 1.0])
 @pytest.mark.parametrize("term", [LOAD, terms.Spring(), terms.FrictionStep(step_time=9.0)])
 def test_a_finding_is_not_nil_within_its_error(healthy, term, size):
-    asked = question.ask(planted(healthy[0], term, (size,)), models.named("gaussian"))
-    found = beside(asked, term).last
-    nil = list(plausible.nil(found, 1, asked.evidence, asked.wide))
+    posed = problem.problem_of(planted(healthy[0], term, (size,)), models.named("gaussian"))
+    found = beside(posed, term).last
+    nil = list(plausible.nil(found, 1, posed.evidence, posed.wide))
     assert nil == ([0] if size == 0.0 else [])
 
 
 def test_where_a_finding_is_nil_others_compete(healthy, monkeypatch):
     run = planted(healthy[0], *CASES["cogging"])
-    asked = question.ask(run, models.named("gaussian"))
+    posed = problem.problem_of(run, models.named("gaussian"))
     known = []
 
     def nil(now, count, *_):
@@ -918,7 +919,7 @@ def test_where_a_finding_is_nil_others_compete(healthy, monkeypatch):
         return iter([0] if len(known) == 1 else [])
 
     monkeypatch.setattr(naming, "nil", nil)
-    found = naming.search(asked.evidence, asked.base, asked.field)
+    found = naming.search(posed.evidence, posed.base, posed.candidate_set)
     # The form of cogging that went does not come again; another form or effect may.
     assert known and len(found.last.terms) == 1 + len(found.taken)
     assert not any(t.trial.candidate.term == terms.Cogging() for t in found.taken)

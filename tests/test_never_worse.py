@@ -11,9 +11,10 @@ import pytest
 from jaxfric import models, predict, read, terms
 from jaxfric.cli import main
 from jaxfric.data import io
-from jaxfric.explanation import doubts, explain, improvement, question, regression
+from jaxfric.explanation import doubts, explain, improvement, regression
 from jaxfric.explanation.explained import DOUBTED
 from jaxfric.explanation.improvement import Errors
+from jaxfric.explanation.problem import problem_of
 from jaxfric.simulation.prediction import delay_of, force_error, in_motion, outliers
 
 from .test_explain import CASES, TIME, healthy, planted
@@ -207,12 +208,12 @@ def test_a_clipped_force_makes_no_model_worse(healthy, part):
 def test_a_constant_load_is_no_friction_that_drives(healthy):
     """A weight of 100 N makes a Coulomb level of one direction negative, and no axis of it."""
     lifted = with_force(healthy[0], healthy[0].force + 100.0)
-    asked = question.ask(lifted, models.gaussian())
-    assert min(float(a) for a in asked.base.alphas[0]) < -50
-    assert not doubts.drives(asked.base, asked.evidence, asked.block)
-    turned = question.ask(with_force(lifted, -lifted.force), models.gaussian())
+    problem = problem_of(lifted, models.gaussian())
+    assert min(float(a) for a in problem.base.alphas[0]) < -50
+    assert not doubts.drives(problem.base, problem.evidence, problem.block)
+    turned = problem_of(with_force(lifted, -lifted.force), models.gaussian())
     assert doubts.drives(turned.base, turned.evidence, turned.block)
-    assert regression.fast(asked.base) == pytest.approx(regression.fast(turned.base), rel=1e-6)
+    assert regression.fast(problem.base) == pytest.approx(regression.fast(turned.base), rel=1e-6)
 
 
 @pytest.mark.slow

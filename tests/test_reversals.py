@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from jaxfric import Recording, explain
-from jaxfric.explanation import evidence, explaining, naming, question, regression, reversals
+from jaxfric.explanation import evidence, explaining, naming, regression, reversals
+from jaxfric.explanation.problem import across_reversals, problem_of
 from jaxfric.models import named
 from jaxfric.terms.effects import EFFECTS
 
@@ -114,8 +115,8 @@ def hilly(seed=0):
 
 
 def searched(recording):
-    asked = question.ask(recording, named("symmetric-coulomb-viscous"))
-    return explaining._searched(recording, asked, 0)
+    problem = problem_of(recording, named("symmetric-coulomb-viscous"))
+    return explaining._searched(recording, problem, 0)
 
 
 def names(found):
@@ -123,8 +124,8 @@ def names(found):
 
 
 def test_what_does_not_act_at_reversals_is_found_without_them():
-    asked, found = searched(hilly())
-    assert asked.reversals and not asked.within.reversals
+    problem, found = searched(hilly())
+    assert problem.reversals and not problem.in_slip.reversals
     assert names(found.start) == ["cogging"] and names(found)[0] == "cogging"
     assert all(EFFECTS[name].at_reversals for name in names(found)[1:]) and len(found.taken) > 1
     # Of the reversals, it is no start for another search.
@@ -135,6 +136,6 @@ def test_what_does_not_act_at_reversals_is_found_without_them():
 
 def test_an_axis_that_sticks_is_asked_once():
     recording = sticking()
-    asked, found = searched(recording)
-    assert not asked.reversals and found.start is None
-    assert question.opened(recording, asked) is None
+    problem, found = searched(recording)
+    assert not problem.reversals and found.start is None
+    assert across_reversals(recording, problem) is None

@@ -37,7 +37,7 @@ class Candidate(NamedTuple):
         return evidence.columns(self.term, self.betas)
 
 
-class Field:
+class CandidateSet:
     """The candidates for one recording, and their columns, kept from round to round.
 
     Those of the motion are computed from the start, while the caller goes on; columns of what a fit

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..terms.effect import Effect
-from .candidates import Candidate, Field, at_frequencies, scaled, tones
+from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .outstanding import outstanding
@@ -76,7 +76,7 @@ class Contest(NamedTuple):
 def contest(
     evidence: Evidence,
     now: Fit,
-    field: Field,
+    field: CandidateSet,
     seed: int = 0,
     among: Callable[[Effect], bool] = lambda effect: True,
 ) -> Contest:
@@ -115,8 +115,8 @@ def contest(
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.chance for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
-    asked = [t for t in trials if among(t.candidate.effect)]
-    return Contest(trials, _finals(seen, now, asked, size), size)
+    eligible = [t for t in trials if among(t.candidate.effect)]
+    return Contest(trials, _finals(seen, now, eligible, size), size)
 
 
 def _trial(judge, candidate, own, scan, p_value, limit) -> Trial:

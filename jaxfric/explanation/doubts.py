@@ -10,7 +10,7 @@ from ..identification.uncertainty import Estimate
 from ..terms.base import summands
 from .evidence import NODES, Evidence
 from .intervals import covariance
-from .question import Question
+from .problem import Problem
 from .regression import Fit
 
 # A remark by which the baseline is what is reported.
@@ -82,21 +82,21 @@ def undescribed(error: float) -> bool:
     return not error**2 <= UNDESCRIBED
 
 
-def contradicted(asked: Question, parameters: dict[str, Estimate]) -> Remark | None:
+def contradicted(problem: Problem, parameters: dict[str, Estimate]) -> Remark | None:
     """What makes force and motion of a recording contradict each other; `None` if nothing does.
 
     **Arguments:** `parameters`, of the base, with their errors.
     """
-    power = max(float(asked.evidence.force @ asked.evidence.force), 1e-300)
-    left = float(np.sqrt(asked.base.energy / power))
+    power = max(float(problem.evidence.force @ problem.evidence.force), 1e-300)
+    left = float(np.sqrt(problem.base.energy / power))
     if undescribed(left):
-        return _late(asked, left)
-    if _corrects(asked.evidence):
+        return _late(problem, left)
+    if _corrects(problem.evidence):
         return None
     inertia = parameters.get("inertia")
     unseen = inertia is None or not np.isfinite(inertia.standard_error)
     negative = unseen or accelerates(parameters)
-    if negative and drives(asked.base, asked.evidence, asked.block):
+    if negative and drives(problem.base, problem.evidence, problem.block):
         return Remark(
             "wrong_sign",
             "The force drives the axis where it should brake it, and brakes it where it should "
@@ -107,9 +107,9 @@ def contradicted(asked: Question, parameters: dict[str, Estimate]) -> Remark | N
     return None
 
 
-def _late(asked: Question, left: float) -> Remark | None:
+def _late(problem: Problem, left: float) -> Remark | None:
     """A force that belongs to another moment of the motion than it is written beside."""
-    found = apart(asked.evidence)
+    found = apart(problem.evidence)
     if found is None:
         return None
     time, error = found
@@ -168,7 +168,7 @@ def _plain_axis(evidence: Evidence) -> np.ndarray:
     return matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
 
 
-def doubts(now: Fit, view: Question, parameters: dict[str, Estimate], error: float) -> list[Remark]:
+def doubts(now: Fit, view: Problem, parameters: dict[str, Estimate], error: float) -> list[Remark]:
     """What makes the model that is reported impossible for an axis.
 
     **Arguments:** `now`, its fit, on the rows of `view`; `parameters` of its base, with all their

@@ -15,7 +15,7 @@ from .evidence import Evidence
 from .locate import locate
 from .naming import LEAST_SHARE, Named
 from .predictions import PREDICTED, with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit, fit
 from .telling import rough, shown_places
 
@@ -30,28 +30,28 @@ class Earlier:
     recording: Recording
 
 
-def obeyed(recording: Recording, asked: Question, found: Named, seed: int = 0) -> Baseline:
+def obeyed(recording: Recording, problem: Problem, found: Named, seed: int = 0) -> Baseline:
     """The baseline that a recording obeys, as explaining it found it.
 
     Without what belongs to a moment of it, which says nothing about another, and without what acts
     on the force that the rest predicts, which no baseline can hold.
     """
-    evidence = with_predictions(asked.evidence, found.last)
+    evidence = with_predictions(problem.evidence, found.last)
     kept = verification.lasting(found.last)
     plain = [i for i, t in enumerate(kept.terms) if not t.coordinates & PREDICTED]
     kept, now = kept.only(plain), found.last
     if len(kept.terms) < len(now.terms):
         now = fit(kept.terms, evidence, kept.betas)
     force = float(np.sqrt(np.mean(evidence.force**2)))
-    seen = with_predictions(asked.evidence, now)
+    seen = with_predictions(problem.evidence, now)
     places = shown_places(locate(seen, now, seed), LEAST_SHARE, force)
-    own = verification.error(now, asked.evidence)
+    own = verification.error(now, problem.evidence)
     errors = {
         "force_error": {"before": own, "after": own},
         "holdout_force_error": None,
         "noise_floor": verification.noise(now, evidence.force),
     }
-    named = spelled.estimates(now, asked.block, recording.unit_names)
+    named = spelled.estimates(now, problem.block, recording.unit_names)
     columns = [
         [known[p.name].standard_error for p in (*term.affine, *term.nonlinear)]
         for term, known in zip(now.terms, named, strict=True)

@@ -15,11 +15,11 @@ from .figures import Figures, cast
 from .improvement import Improved, Rest, with_late
 from .naming import Named
 from .predictions import with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit, fit
 
 
-def filtered_errors(asked: Question, first: Fit, where: Question, left: Named) -> dict[str, Any]:
+def filtered_errors(problem: Problem, first: Fit, where: Problem, left: Named) -> dict[str, Any]:
     """The force errors through the kernel of the rows."""
 
     def pair(before, after, rephased=frozenset()):
@@ -29,46 +29,46 @@ def filtered_errors(asked: Question, first: Fit, where: Question, left: Named) -
         }
 
     return {
-        "force_error": pair(asked.evidence, where.evidence),
-        "holdout_force_error": asked.held and pair(asked.held, where.held, left.rephased),
+        "force_error": pair(problem.evidence, where.evidence),
+        "holdout_force_error": problem.held and pair(problem.held, where.held, left.rephased),
         "noise_floor": verification.noise(left.last, where.evidence.force),
     }
 
 
 def document(
-    asked: Question, better: Improved, filtered: dict, model: Model, figures: Figures
+    problem: Problem, better: Improved, filtered: dict, model: Model, figures: Figures
 ) -> dict:
     """The document's errors: those of `predict` and a subtraction, and those through the kernel."""
 
     def pair(before, after):
         return None if before is None else {"before": before, "after": after}
 
-    before, after, reach = better.before, better.after, asked.evidence.reach
-    refitted = _refitted(asked, better, figures)
+    before, after, reach = better.before, better.after, problem.evidence.reach
+    refitted = _refitted(problem, better, figures)
     return {
         "force_error": pair(before.here, after.here),
         "holdout_force_error": pair(before.held, after.held),
-        "holdout_adjusted": _adjusted(better) if asked.held else None,
+        "holdout_adjusted": _adjusted(better) if problem.held else None,
         "holdout_refitted_error": refitted["error"],
         "holdout_values": refitted.get("values"),
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach),
         "filtered_force_error": filtered["force_error"]
-        | {"width": reach, "force_taken_later": asked.delay},
+        | {"width": reach, "force_taken_later": problem.delay},
         "filtered_holdout_force_error": filtered["holdout_force_error"],
         "filtered_holdout_refitted_error": refitted["filtered"],
         "filtered_noise_floor": filtered["noise_floor"],
     }
 
 
-def _refitted(asked: Question, better: Improved, figures: Figures) -> dict[str, Any]:
+def _refitted(problem: Problem, better: Improved, figures: Figures) -> dict[str, Any]:
     """What the model leaves of the held-out recording with values of its own, and which these are.
 
     Named are values of the baseline's terms that differ by more than both recordings leave open.
     """
-    if asked.held is None:
+    if problem.held is None:
         return dict.fromkeys(("error", "filtered"))
-    left, units = better.rest[1], asked.evidence.motion.units
+    left, units = better.rest[1], problem.evidence.motion.units
     held = better.rest[0].held
     carried = verification.carried(left.last, held, left.rephased)
     again = fit(carried.terms, with_predictions(held, carried), carried.betas)

@@ -31,7 +31,7 @@ from .forward import motion_error
 from .holdout import check_signals, confirmed
 from .improvement import Rest, improved
 from .naming import Named, search
-from .question import ALIGNED, Question, ask, beside, opened
+from .problem import ALIGNED, Problem, across_reversals, problem_of, with_holdout
 from .telling import facts, tell
 from .timing import late, overlooked, settled
 
@@ -58,7 +58,7 @@ def explain(
 
     - `recording`, and `holdout`, which is only judged on: signals of shape `(N,)`.
     - `baseline`: a model's name or a sum of terms, whose parameters are fitted; a model or an
-      identification, whose values are questioned first (`parameter_mismatch`); another
+      identification, whose values are tested first (`parameter_mismatch`); another
       simulator's force along the recorded motion (`jf.simulators.Known`, any function from a
       recording to it, `(N,)`, or a recording of the same motion), which stands as it is; or a
       recording of the same reference run through another simulator, which a sum of terms is
@@ -209,38 +209,38 @@ def _explain(
     doing("fitting the baseline")
     known = _known(baseline, seed)
     motion = motion_of(recording)
-    asked = ask(motion, known.structure)
+    problem = problem_of(motion, known.structure)
     if holdout is not None:
         there = motion_of(holdout)
-        beside(asked, there)  # says what is wrong with it before anything takes time
+        with_holdout(problem, there)  # says what is wrong with it before anything takes time
     if known.fit is not None:
-        known = rephased(known, asked.evidence)
-    remarks = [*remarks, *_contradictions(asked)]
+        known = rephased(known, problem.evidence)
+    remarks = [*remarks, *_contradictions(problem)]
     wrong = None
     if any(remark.severe for remark in remarks):
-        found = _nothing(asked)
+        found = _nothing(problem)
         if known.model is not None and fixed:
-            found = _as_given(known.model, found, asked, ())
-        rest = asked, found
+            found = _as_given(known.model, found, problem, ())
+        rest = problem, found
     else:
         doing("looking for what is missing")
-        asked, found, rest = _search(motion, known, asked, seed)
+        problem, found, rest = _search(motion, known, problem, seed)
         doing("judging the values")
         wrong = _wrong(known, rest, recording, seed)
         if known.model is not None and (wrong is not None or fixed):
             free = () if wrong is None else tuple(wrong.moved)
-            found = _as_given(known.model, found, asked, free)
+            found = _as_given(known.model, found, problem, free)
             rest = rest[0], _as_given(known.model, rest[1], rest[0], free)
-    first = found.base if wrong is None else at_values(known.model, asked.evidence)
+    first = found.base if wrong is None else at_values(known.model, problem.evidence)
     doing("predicting with the improved model")
-    better = improved(first, found, rest, asked, figures)
+    better = improved(first, found, rest, problem, figures)
     if holdout is not None:
         doing("judging by the held-out recording")
         check_signals(better.found, recording, holdout)
-        better, asked = confirmed(better, asked, there, figures)
+        better, problem = confirmed(better, problem, there, figures)
     doing("locating what is left")
     wrong = wrong if better.refitted else None
-    explanation = tell(recording, asked, better, known, wrong, figures, remarks, seed)
+    explanation = tell(recording, problem, better, known, wrong, figures, remarks, seed)
     if simulate:
         doing("running both models forward")
         models = {"before": explanation.baseline, "after": explanation.model}
@@ -262,44 +262,44 @@ def _wrong(known: Baseline, rest: Rest, recording: Recording, seed: int) -> Mism
     return changed(wrong, known, left.last, [float(here[n].standard_error) for n in names])
 
 
-def _contradictions(asked: Question) -> list[Remark]:
+def _contradictions(problem: Problem) -> list[Remark]:
     """What makes force and motion contradict each other, by the base alone."""
-    units = asked.evidence.motion.unit_names
-    remark = contradicted(asked, spelled.estimates(asked.base, asked.block, units)[0])
+    units = problem.evidence.motion.unit_names
+    remark = contradicted(problem, spelled.estimates(problem.base, problem.block, units)[0])
     return [] if remark is None else [remark]
 
 
-def _nothing(asked: Question) -> Named:
+def _nothing(problem: Problem) -> Named:
     """That nothing is named, nor looked for."""
-    for field in asked.fields:
-        field.close()
-    return Named(asked.base, asked.base, [], Contest([], [], float(len(asked.base.residual))))
+    for candidates in problem.candidate_sets:
+        candidates.close()
+    return Named(problem.base, problem.base, [], Contest([], [], float(len(problem.base.residual))))
 
 
-def _search(recording, known: Baseline, asked: Question, seed: int) -> tuple[Question, Named, Rest]:
-    """The findings, and the question where what they leave is judged, with the findings there.
+def _search(recording, known: Baseline, problem: Problem, seed: int) -> tuple[Problem, Named, Rest]:
+    """The findings, and the problem where their remainder is examined, with the findings there.
 
     To first order a delay is a column; what it leaves of second order would be named too. So where
     the force acts late it is put back, and the search is done once more.
     """
-    asked, found = pursue(recording, known.structure, seed, known=asked)
+    problem, found = pursue(recording, known.structure, seed, known=problem)
     lateness = None
     if any(traits(term).late for term in found.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
-        lateness = late(recording, asked.within or asked, found.start or found)
+        lateness = late(recording, problem.in_slip or problem, found.start or found)
     sure = lateness is not None
-    lateness = lateness or overlooked(recording, asked, found, seed)
+    lateness = lateness or overlooked(recording, problem, found, seed)
     if lateness is None:
-        return asked, found, (asked, found)
-    there, behind = pursue(lateness.undone(recording), known.structure, seed, asked)
-    both, behind = settled(found, behind, lateness, asked, there)
+        return problem, found, (problem, found)
+    there, behind = pursue(lateness.undone(recording), known.structure, seed, problem)
+    both, behind = settled(found, behind, lateness, problem, there)
     errors = (
         verification.error(*pair)
-        for pair in ((behind.last, there.evidence), (found.last, asked.evidence))
+        for pair in ((behind.last, there.evidence), (found.last, problem.evidence))
     )
     if not sure and operator.ge(*errors):
-        return asked, found, (asked, found)
-    return asked, both, (there, behind)
+        return problem, found, (problem, found)
+    return problem, both, (there, behind)
 
 
 def _known(baseline, seed: int) -> Baseline:
@@ -308,38 +308,42 @@ def _known(baseline, seed: int) -> Baseline:
     return baseline_of(baseline)
 
 
-def _as_given(model: Model, found: Named, asked: Question, free: tuple[int, ...]) -> Named:
+def _as_given(model: Model, found: Named, problem: Problem, free: tuple[int, ...]) -> Named:
     """The findings beside the baseline's own values, but for those that the recording refutes."""
-    base, last = (as_given(model, now, asked.evidence, free) for now in (found.base, found.last))
+    base, last = (as_given(model, now, problem.evidence, free) for now in (found.base, found.last))
     return found._replace(base=base, last=last, given=model, free=free)
 
 
 def pursue(
-    recording, structure, seed, before=None, known: Question | None = None
-) -> tuple[Question, Named]:
-    """The question, put again if what was found changes how force and motion are aligned.
+    recording, structure, seed, before=None, known: Problem | None = None
+) -> tuple[Problem, Named]:
+    """The problem, set up again if what was found changes how force and motion are aligned.
 
-    **Arguments:** `before`: a question about the same motion; `known`: the question itself, if it
-    has been put.
+    **Arguments:** `before`: a problem of the same motion; `known`: the problem itself, if it
+    is known.
     """
     recording = motion_of(recording)
-    asked = known or ask(recording, structure, before=before)
-    asked, found = _searched(recording, asked, seed)
+    problem = known or problem_of(recording, structure, before=before)
+    problem, found = _searched(recording, problem, seed)
     if found.taken:
-        again = ask(recording, structure, found.last, asked)
-        if abs(again.delay - asked.delay) > ALIGNED * asked.evidence.limits.interval:
-            asked, found = _searched(recording, again, seed)
-    return asked, found
+        again = problem_of(recording, structure, found.last, problem)
+        if abs(again.delay - problem.delay) > ALIGNED * problem.evidence.limits.interval:
+            problem, found = _searched(recording, again, seed)
+    return problem, found
 
 
-def _searched(recording, asked: Question, seed) -> tuple[Question, Named]:
+def _searched(recording, problem: Problem, seed) -> tuple[Problem, Named]:
     """What the rows without reversals show, and then, where they say something, those across.
 
     The latter hold what acts at reversals tenfold, and hide the rest behind what of it no term
     has quite the shape of.
     """
-    found = search(asked.evidence, asked.base, asked.field, asked.wider, seed)
-    across = opened(recording, asked)
+    found = search(
+        problem.evidence, problem.base, problem.candidate_set, problem.wide_kernels, seed
+    )
+    across = across_reversals(recording, problem)
     if across is None:
-        return asked, found
-    return across, search(across.evidence, across.base, across.field, across.wider, seed, found)
+        return problem, found
+    return across, search(
+        across.evidence, across.base, across.candidate_set, across.wide_kernels, seed, found
+    )

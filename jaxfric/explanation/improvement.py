@@ -12,11 +12,11 @@ from . import parameters as spelled, verification
 from .figures import Figures
 from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit, fit
 
-# The question where what the findings leave is judged, and the findings there.
-Rest = tuple[Question, Named]
+# The problem in which the remainder of the findings is examined, and the selection there.
+Rest = tuple[Problem, Named]
 
 
 class Errors(NamedTuple):
@@ -61,31 +61,31 @@ class Improved(NamedTuple):
     refuted: tuple[int, ...] = ()
 
 
-def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Figures) -> Improved:
+def improved(first: Fit, found: Named, rest: Rest, problem: Problem, figures: Figures) -> Improved:
     """The findings, without those that make the saved model worse than the baseline `first`.
 
     By either figure, over the same samples. The one goes without which the force error is least.
     """
-    units = asked.evidence.motion.units
+    units = problem.evidence.motion.units
     base = found._replace(last=first, taken=[])
     refitted = first is not found.base
     start, spoilt = found, None
     while True:
         delay = delay_of(spelled.model(found.last, units))
-        before = force_errors(base, (asked, base), asked, figures, units, delay)
+        before = force_errors(base, (problem, base), problem, figures, units, delay)
         alike = not found.taken and not refitted
-        after = before if alike else force_errors(found, rest, asked, figures, units)
+        after = before if alike else force_errors(found, rest, problem, figures, units)
         if not after.worse(before, figures.rounding):
-            less = None if spoilt is None else _without_idle(found, rest, asked)
+            less = None if spoilt is None else _without_idle(found, rest, problem)
             if less is None:
                 break
             found, rest = less
             continue
         spoilt = spoilt or after
         if not found.taken:
-            found, rest, refitted = base, (asked, base), False
+            found, rest, refitted = base, (problem, base), False
             continue
-        fewer = (lacking(found, rest, asked, n) for n in range(len(found.taken)))
+        fewer = (lacking(found, rest, problem, n) for n in range(len(found.taken)))
         found, rest = min(fewer, key=lambda pair: _here(pair[0], figures, units))
     kept = [taken.trial.candidate.effect.name for taken in found.taken]
     names = [taken.trial.candidate.effect.name for taken in start.taken]
@@ -95,10 +95,10 @@ def improved(first: Fit, found: Named, rest: Rest, asked: Question, figures: Fig
     return Improved(first, found, rest, refitted, before, after, gone, spoilt)
 
 
-def _without_idle(found: Named, rest: Rest, asked: Question) -> tuple[Named, Rest] | None:
+def _without_idle(found: Named, rest: Rest, problem: Problem) -> tuple[Named, Rest] | None:
     """Without a finding that stood beside one that went, and by itself is a trifle."""
     for number in range(len(found.taken)):
-        less, other = lacking(found, rest, asked, number)
+        less, other = lacking(found, rest, problem, number)
         if 1 - rest[1].last.energy / other[1].last.energy < LEAST_SHARE:
             return less, other
     return None
@@ -133,7 +133,7 @@ def _here(found: Named, figures: Figures, units) -> float:
 
 
 def force_errors(
-    found: Named, rest: Rest, asked: Question, figures: Figures, units, delay: float | None = None
+    found: Named, rest: Rest, problem: Problem, figures: Figures, units, delay: float | None = None
 ) -> Errors:
     """The force errors of a model, on the held-out recording too where there are rows of it.
 
@@ -142,43 +142,43 @@ def force_errors(
     where, left = rest
     filtered = verification.error(left.last, where.evidence)
     here = figures.here(spelled.model(found.last, units), delay)
-    if asked.held is None:
+    if problem.held is None:
         return Errors(here, None, filtered, None)
     held = figures.held(elsewhere(found, rest, units), delay)
     return Errors(here, held, filtered, verification.error(left.last, where.held, left.rephased))
 
 
-def beside_others(found: Named, rest: Rest, asked: Question, number: int) -> Fit:
+def beside_others(found: Named, rest: Rest, problem: Problem, number: int) -> Fit:
     """The model without one of the findings, the others refitted.
 
     Of a force that acts late all that undoing it takes away is its own; the others are refitted
     with the force put back.
     """
     late = number == len(rest[1].taken)
-    place, named = (asked, found) if late else rest
+    place, named = (problem, found) if late else rest
     return verification.lacking(named, with_predictions(place.evidence, named.last), number)
 
 
-def lacking(found: Named, rest: Rest, asked: Question, number: int) -> tuple[Named, Rest]:
+def lacking(found: Named, rest: Rest, problem: Problem, number: int) -> tuple[Named, Rest]:
     """The findings without one of them, the others refitted; where the force acts late, too."""
     where, left = rest
-    if where is asked or number == len(left.taken):
-        less = _less(found, asked, number)
-        return less, (asked, less)
+    if where is problem or number == len(left.taken):
+        less = _less(found, problem, number)
+        return less, (problem, less)
     left = _less(left, where, number)
     late = found.last.terms[-1]
     beta, alpha = found.last.betas[-1], found.last.alphas[-1]
-    seen = with_predictions(asked.evidence, left.last)
+    seen = with_predictions(problem.evidence, left.last)
     now = fit((*left.last.terms, late), seen, [*left.last.betas, beta], 0)
     now = now._replace(alphas=(*left.last.alphas, alpha), betas=(*left.last.betas, beta))
     return found._replace(last=now, taken=_but(found.taken, number)), (where, left)
 
 
-def _less(found: Named, asked: Question, number: int) -> Named:
+def _less(found: Named, problem: Problem, number: int) -> Named:
     taken = _but(found.taken, number)
     if not taken:
         return found._replace(last=found.base, taken=[])
-    evidence = with_predictions(asked.evidence, found.last)
+    evidence = with_predictions(problem.evidence, found.last)
     last = verification.lacking(found, evidence, number)
     return found._replace(last=last, taken=taken)
 

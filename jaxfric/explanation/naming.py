@@ -10,14 +10,14 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from ..terms.effect import Effect
-from .candidates import Candidate, Field
+from .candidates import Candidate, CandidateSet
 from .chance import DRAWS, LEVEL, blocks
 from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence, Motion
 from .intervals import left_out
 from .plausible import machines, nil
 from .predictions import with_predictions
-from .question import BETWEEN, Wider
+from .problem import BETWEEN, WideKernels
 from .regression import Fit, fast, fit, without
 
 # A term is believed if it accounts for this much of the mean-square residual, too: below it, the
@@ -84,8 +84,8 @@ class Named(NamedTuple):
 def search(
     evidence: Evidence,
     base: Fit,
-    field: Field,
-    wider: Wider = (None, None),
+    field: CandidateSet,
+    wider: WideKernels = (None, None),
     seed: int = 0,
     start: Named | None = None,
 ) -> Named:
@@ -296,7 +296,7 @@ def _again(finalist: Finalist, taken: list[Taken]) -> bool:
 HALF = 0.5
 
 
-def _confirmed(finalist: Finalist, now: Fit, wider: Wider, least: float) -> bool:
+def _confirmed(finalist: Finalist, now: Fit, wider: WideKernels, least: float) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 
     There the noise of the derivatives is down by 2⁵ to 2⁷ in power, the physics hardly. But a load

@@ -18,14 +18,14 @@ from .improvement import Improved
 from .intervals import covariance
 from .locate import coordinates
 from .predictions import with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit
 
 # Half a 95 % interval in standard errors, as in the findings' sentences.
 HALF_WIDTH = 2.0
 
 
-def partial_residuals(asked: Question, better: Improved) -> list[dict[str, Any]]:
+def partial_residuals(problem: Problem, better: Improved) -> list[dict[str, Any]]:
     """The picture of each finding, in the order of discovery, as plain lists.
 
     Each holds `coordinate`, `unit`, `at`, and at these places `measured` with its standard error
@@ -34,7 +34,7 @@ def partial_residuals(asked: Question, better: Improved) -> list[dict[str, Any]]
     pictures = []
     for number, taken in enumerate(better.found.taken):
         late = number >= len(better.rest[1].taken)
-        where, named = (asked, better.found) if late else better.rest
+        where, named = (problem, better.found) if late else better.rest
         now = named.last
         place = len(now.terms) - len(named.taken) + number
         seen = with_predictions(where.evidence, now)
@@ -48,7 +48,7 @@ def partial_residuals(asked: Question, better: Improved) -> list[dict[str, Any]]
     return pictures
 
 
-def moved(asked: Question, better: Improved, wrong: Mismatch) -> dict[str, Any]:
+def moved(problem: Problem, better: Improved, wrong: Mismatch) -> dict[str, Any]:
     """The picture of wrong values: by how much the baseline's force changes with the right ones."""
     where, named = better.rest
     names = [p.name for p in (*better.first.terms[0].affine, *better.first.terms[0].nonlinear)]

@@ -27,7 +27,7 @@ from .locate import NOISY, Place, locate, repeated
 from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY, Named
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .predictions import with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit, fast, fit
 from .sentences import changed_sentence, mismatch_sentence, sentence
 from .views import estimated
@@ -35,7 +35,7 @@ from .views import estimated
 
 def tell(
     recording: Recording,
-    asked: Question,
+    problem: Problem,
     better: Improved,
     known: Baseline,
     wrong: Mismatch | None,
@@ -49,35 +49,35 @@ def tell(
     the baseline as it was given, and `wrong`, which of its values are; `figures`: the force errors
     of models; `remarks`: what was said about the recording before.
     """
-    units, evidence = recording.unit_names, asked.evidence
+    units, evidence = recording.unit_names, problem.evidence
     first, found, rest = better.first, better.found, better.rest
-    before, after = _places(asked, better, wrong, seed)
-    findings, alone = _findings(found, asked, rest, first)
-    refuted = _refuted(better, asked)
-    shown = partial_residuals(asked, better)
+    before, after = _places(problem, better, wrong, seed)
+    findings, alone = _findings(found, problem, rest, first)
+    refuted = _refuted(better, problem)
+    shown = partial_residuals(problem, better)
     standing = _stand_ins(alone, 1 - found.last.energy / first.energy)
     shares: dict[str, float] = {}
     for finding in findings:
         shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
     values = spelled.estimates(
-        found.last if wrong is None else freed(found.last, wrong.moved), asked.block, units
+        found.last if wrong is None else freed(found.last, wrong.moved), problem.block, units
     )[0]
     if wrong is not None:
-        findings = [_moved(values, wrong, known, found, first, asked), *findings]
-        shown = [moved_curve(asked, better, wrong), *shown]
+        findings = [_moved(values, wrong, known, found, first, problem), *findings]
+        shown = [moved_curve(problem, better, wrong), *shown]
     models = tuple(spelled.model(now, recording.units) for now in (first, found.last))
     drawn = curves(
-        before[:6], first, found.last, evidence, asked.held, units, models, found.rephased
+        before[:6], first, found.last, evidence, problem.held, units, models, found.rephased
     )
     told = sorted(zip(findings, shown, strict=True), key=lambda pair: -pair[0].share)
     findings, drawn["findings"] = [each for each, _ in told], [picture for _, picture in told]
-    filtered = filtered_errors(asked, first, *rest)
+    filtered = filtered_errors(problem, first, *rest)
     if not any(remark.severe for remark in remarks):
-        remarks = [*remarks, *_doubts(asked, better, units)]
+        remarks = [*remarks, *_doubts(problem, better, units)]
     much = rough(filtered, shares) and not known.rough
     new, later = ([p for p in some if p.coordinate not in known.left] for some in (before, after))
     verdict = _verdict(findings, new, later, much, standing)
-    errors = document(asked, better, filtered, models[1], figures)
+    errors = document(problem, better, filtered, models[1], figures)
     remarks = [*remarks, *_elsewhere(errors)]
     return Explanation(
         verdict=_doubted(verdict, remarks, known.fit is not None),
@@ -93,19 +93,19 @@ def tell(
         recording=facts(recording),
         curves=drawn,
         warnings=[remark.to_dict() for remark in remarks],
-        holdout_model=None if asked.held is None else elsewhere(found, rest, recording.units),
+        holdout_model=None if problem.held is None else elsewhere(found, rest, recording.units),
     )
 
 
-def _places(asked: Question, better: Improved, wrong: Mismatch | None, seed: int):
+def _places(problem: Problem, better: Improved, wrong: Mismatch | None, seed: int):
     """Where the baseline's residual has structure, and where that of the findings has."""
-    first, evidence = better.first, asked.evidence
+    first, evidence = better.first, problem.evidence
     force = float(np.sqrt(np.mean(evidence.force**2)))
     before = shown_places(
         locate(with_predictions(evidence, first), first, seed), LEAST_SHARE, force
     )
-    before = _through_wide(before, first, asked.wide, seed)
-    before = _lasting(before, first, asked)
+    before = _through_wide(before, first, problem.wide, seed)
+    before = _lasting(before, first, problem)
     if not better.found.taken and wrong is None:
         return before, []
     where, left = better.rest
@@ -115,17 +115,17 @@ def _places(asked: Question, better: Improved, wrong: Mismatch | None, seed: int
     return before, _lasting(after, left.last, where)
 
 
-def _doubts(asked: Question, better: Improved, units) -> list[Remark]:
+def _doubts(problem: Problem, better: Improved, units) -> list[Remark]:
     """What makes the model that is reported doubtful, and what was not reported for its errors."""
     where, left = better.rest
     values = spelled.estimates(left.last, where.block, units)[0]
     if accelerates(values):  # with what other views say of it
-        values = estimated(better.found, asked, better.rest)[0]
+        values = estimated(better.found, problem, better.rest)[0]
     remarks = doubts(left.last, where, values, better.after.filtered)
     if better.spoilt is not None:
         remark = not_better(better.gone, better.before, better.spoilt)
         late = any(EFFECTS[name].late for name in better.gone)
-        if late and asked.evidence.motion.position is None:
+        if late and problem.evidence.motion.position is None:
             remark = remark._replace(text=f"{remark.text} {NO_POSITION}")
         remarks.append(remark)
     return remarks
@@ -169,7 +169,7 @@ def _doubted(verdict: str, remarks: Sequence[Remark], compared: bool) -> str:
 
 
 def _moved(
-    values, wrong: Mismatch, known: Baseline, found: Named, first: Fit, asked: Question
+    values, wrong: Mismatch, known: Baseline, found: Named, first: Fit, problem: Problem
 ) -> Finding:
     names = [p.name for p in (*found.base.terms[0].affine, *found.base.terms[0].nonlinear)]
     errors = np.zeros(len(names)) if known.errors is None else known.errors
@@ -181,8 +181,8 @@ def _moved(
                 before, now.value, now.standard_error, now.unit, float(errors[i])
             )
     held = None
-    if asked.held is not None:
-        held = verification.share(first, found.base, first, asked.held)
+    if problem.held is not None:
+        held = verification.share(first, found.base, first, problem.held)
     text = mismatch_sentence(moved, wrong.share)
     if known.fit is not None:
         text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
@@ -221,16 +221,16 @@ def _through_wide(places: list[Place], now: Fit, wide: Evidence | None, seed) ->
     return [p for p in places if p.coordinate in sure or not doubted(p)]
 
 
-def _lasting(places: list[Place], now: Fit, asked: Question) -> list[Place]:
+def _lasting(places: list[Place], now: Fit, problem: Problem) -> list[Place]:
     """The places that the held-out recording shows too, and no slow part of the noise.
 
     Every axis has a load that wanders: one that is slow beside the kernel but no larger than what
     differs from row to row is the same noise.
     """
     places = [p for p in places if p.coordinate != "time" or p.size > fast(now)]
-    if asked.held is None:
+    if problem.held is None:
         return places
-    return repeated(places, now, with_predictions(asked.held, now))
+    return repeated(places, now, with_predictions(problem.held, now))
 
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
@@ -300,27 +300,29 @@ NO_POSITION = (
 )
 
 
-def _findings(found: Named, asked: Question, rest, first: Fit) -> tuple[list[Finding], list[float]]:
+def _findings(
+    found: Named, problem: Problem, rest, first: Fit
+) -> tuple[list[Finding], list[float]]:
     """The findings, and the share of each beside all the others."""
     start = len(found.last.terms) - len(found.taken)
-    values = estimated(found, asked, rest)[start:]
+    values = estimated(found, problem, rest)[start:]
     findings, alone = [], []
     for number, (taken, parameters) in enumerate(zip(found.taken, values, strict=True)):
         effect = taken.trial.candidate.effect
         if effect.moment:
-            parameters = _dated(parameters, effect.moment, asked.evidence)
-        share, held = _shares(found, asked, rest, first, number)
+            parameters = _dated(parameters, effect.moment, problem.evidence)
+        share, held = _shares(found, problem, rest, first, number)
         alone.append(share)
         if twins := _twins(found, number):
-            share, held = _shares(found, asked, _without(rest, twins), first, number)
+            share, held = _shares(found, problem, _without(rest, twins), first, number)
         rivals = taken.rivals
-        text = sentence(effect.name, parameters, share, rivals, _extent(asked.evidence))
+        text = sentence(effect.name, parameters, share, rivals, _extent(problem.evidence))
         if taken.rephased:
             text += (
                 " On the held-out recording it has the same period and amplitude at another "
                 "phase: the position's zero has moved, as after another homing."
             )
-        if effect.late and asked.evidence.motion.position is None:
+        if effect.late and problem.evidence.motion.position is None:
             text += f" {NO_POSITION}"
         findings.append(
             Finding(
@@ -339,11 +341,11 @@ def _findings(found: Named, asked: Question, rest, first: Fit) -> tuple[list[Fin
     return findings, alone
 
 
-def _refuted(better: Improved, asked: Question) -> list[Finding]:
+def _refuted(better: Improved, problem: Problem) -> list[Finding]:
     """What this recording shows and the held-out one does not bear out."""
     if not better.refuted:
         return []
-    every, _ = _findings(better.claimed[0], asked, better.claimed[1], better.first)
+    every, _ = _findings(better.claimed[0], problem, better.claimed[1], better.first)
     text = " The held-out recording does not bear it out: it is not in the model."
     return [
         every[n]._replace(confirmed=False, sentence=every[n].sentence + text)
@@ -361,7 +363,7 @@ def _twins(found: Named, number: int) -> list[int]:
     return [n for n in reversed(range(number + 1, len(names))) if names[n] == names[number]]
 
 
-def _without(rest: tuple[Question, Named], numbers: list[int]) -> tuple[Question, Named]:
+def _without(rest: tuple[Problem, Named], numbers: list[int]) -> tuple[Problem, Named]:
     """What is judged, without some findings, of which the last comes first."""
     where, left = rest
     evidence = with_predictions(where.evidence, left.last)
@@ -379,7 +381,7 @@ def _extent(evidence: Evidence) -> Extent:
 
 
 def _shares(
-    found: Named, asked: Question, rest, first: Fit, number: int
+    found: Named, problem: Problem, rest, first: Fit, number: int
 ) -> tuple[float, float | None]:
     """The part of the mismatch that a finding alone accounts for, here and held out.
 
@@ -388,13 +390,13 @@ def _shares(
     """
     left = rest[1]
     base = found.base if number == len(left.taken) else left.base
-    less = beside_others(found, rest, asked, number)
+    less = beside_others(found, rest, problem, number)
     # No more than the base leaves, which refitting in a few steps may miss.
     share = float((min(less.energy, base.energy) - left.last.energy) / first.energy)
-    if asked.held is None or found.taken[number].trial.candidate.effect.momentary:
+    if problem.held is None or found.taken[number].trial.candidate.effect.momentary:
         return share, None
-    without, with_it = residuals(less, rest, asked, number)
-    power = np.sum(verification.residual(first, asked.held) ** 2)
+    without, with_it = residuals(less, rest, problem, number)
+    power = np.sum(verification.residual(first, problem.held) ** 2)
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
 
 

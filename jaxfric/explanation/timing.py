@@ -21,7 +21,7 @@ from .contest import RIVAL, Trial
 from .evidence import Motion, gather, motion_of
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
-from .question import Question
+from .problem import Problem
 from .regression import Fit, fast, fit, without
 
 Undo = Callable[[Recording, float], Recording]
@@ -49,7 +49,7 @@ class Late(NamedTuple):
         return _undone(motion_of(recording), self.undo, self.time)
 
 
-def late(recording: Motion, asked: Question, found: Named) -> Late | None:
+def late(recording: Motion, problem: Problem, found: Named) -> Late | None:
     """The delay or lag among the findings under its right name, where there is one."""
     start = len(found.last.terms) - len(found.taken)
     places = [i for i, term in enumerate(found.last.terms) if traits(term).late]
@@ -59,7 +59,7 @@ def late(recording: Motion, asked: Question, found: Named) -> Late | None:
     guess = float(found.last.alphas[place][0])
     if guess <= 0:
         return None
-    undoing = _Undoing(recording, asked, found.last)
+    undoing = _Undoing(recording, problem, found.last)
     return _told_apart(undoing, guess, found.taken[place - start], found.left.size)
 
 
@@ -68,7 +68,7 @@ def late(recording: Motion, asked: Question, found: Named) -> Late | None:
 MOST_LATE = 0.5
 
 
-def overlooked(recording: Motion, asked: Question, found: Named, seed: int = 0) -> Late | None:
+def overlooked(recording: Motion, problem: Problem, found: Named, seed: int = 0) -> Late | None:
     """A delay or lag beside the findings that is too long for its first order to show.
 
     Times are doubled from one sampling period on until undoing them does more harm than good, which
@@ -77,9 +77,9 @@ def overlooked(recording: Motion, asked: Question, found: Named, seed: int = 0) 
     """
     if any(traits(term).late for term in found.last.terms):
         return None
-    undoing = _Undoing(recording, asked, found.last)
+    undoing = _Undoing(recording, problem, found.last)
     before = undoing.rest(_as_it_is, 0.0)
-    power, limits = before @ before, asked.evidence.limits
+    power, limits = before @ before, problem.evidence.limits
     tried = []
     for effect in ways():
         time = limits.interval
@@ -92,10 +92,10 @@ def overlooked(recording: Motion, asked: Question, found: Named, seed: int = 0) 
             return None
     effect, time, rest = min(tried, key=lambda each: each[2] @ each[2])
     gain, undo = float(1 - rest @ rest / power), effect.undone
-    wide = asked.wide
+    wide = problem.wide
     if gain < MOST_LATE or (wide and undoing.gain(undo, time, wide.width) < MOST_LATE):
         return None
-    p_value = agreement(np.stack([before**2 - each[2] ** 2 for each in tried]), asked.block, seed)
+    p_value = agreement(np.stack([before**2 - each[2] ** 2 for each in tried]), problem.block, seed)
     if p_value > LEVEL:
         return None
     candidate = _candidate(effect)
@@ -106,19 +106,21 @@ def overlooked(recording: Motion, asked: Question, found: Named, seed: int = 0) 
 class _Undoing:
     """A recording whose delay or lag is undone, and the terms that then explain it."""
 
-    def __init__(self, recording: Recording | Motion, asked: Question, known: Fit):
-        self.motion, self.asked, self.known = motion_of(recording), asked, known
+    def __init__(self, recording: Recording | Motion, problem: Problem, known: Fit):
+        self.motion, self.problem, self.known = motion_of(recording), problem, known
         pairs = zip(known.terms, known.betas, strict=True)
         self.terms, self.betas = zip(*(p for p in pairs if not traits(p[0]).late), strict=True)
         count = self.motion.recording.num_samples
         self.noise = self.motion.forced(np.random.default_rng(0).normal(size=count))
         self.hiss = functools.cache(self._hiss)
-        narrow = self.hiss(_as_it_is, 0.0, asked.evidence.width)
+        narrow = self.hiss(_as_it_is, 0.0, problem.evidence.width)
         self.power = fast(known) ** 2 / narrow  # of the force's noise, in the time domain, N²
 
     def _hiss(self, undo: Undo, time: float, width: int) -> float:
         """What white noise of the force leaves in a row, in parts of its power."""
-        rows = gather(_undone(self.noise, undo, time), width, reversals=self.asked.reversals).target
+        rows = gather(
+            _undone(self.noise, undo, time), width, reversals=self.problem.reversals
+        ).target
         return float(np.mean(rows**2))
 
     def rest(self, undo: Undo, time: float, width: int | None = None) -> np.ndarray:
@@ -127,8 +129,8 @@ class _Undoing:
         A lag undone takes noise away, too, which says nothing for it: what there is of noise in the
         rest counts as if it were untouched. What else is in the rest is left by both ways alike.
         """
-        asked, width = self.asked, width or self.asked.evidence.width
-        view = gather(_undone(self.motion, undo, time), width, asked.delay, asked.reversals)
+        problem, width = self.problem, width or self.problem.evidence.width
+        view = gather(_undone(self.motion, undo, time), width, problem.delay, problem.reversals)
         now = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
         before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
         left = float(np.mean(now.residual**2))
@@ -178,7 +180,7 @@ def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
 
 def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> Late:
     """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
-    asked = undoing.asked
+    problem = undoing.problem
     least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
     best = EFFECTS[min(least, key=lambda name: least[name][0])]
     energy, time = least.pop(best.name)
@@ -186,11 +188,11 @@ def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> L
     near = (name for name, gap in others.items() if gap < RIVAL)
     rivals = (*near, *(r for r in taken.rivals if r != best.name and r not in others))
     wide = time
-    if asked.wide is not None:
-        wide = undoing.least(best.undone, time, 2 * asked.evidence.width)[1]
+    if problem.wide is not None:
+        wide = undoing.least(best.undone, time, 2 * problem.evidence.width)[1]
     # Smoothing errs with the square of the width, so a third of what doubling it changes is left
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
-    smoothed = float(np.hypot((wide - time) / 3, asked.evidence.limits.interval / np.sqrt(12)))
+    smoothed = float(np.hypot((wide - time) / 3, problem.evidence.limits.interval / np.sqrt(12)))
     trial = taken.trial._replace(candidate=_candidate(best))
     return Late(time, best.undone, taken._replace(trial=trial, rivals=rivals), smoothed)
 
@@ -205,7 +207,7 @@ def _candidate(effect: Effect) -> Candidate:
 
 
 def settled(
-    found: Named, behind: Named, lateness: Late, asked: Question, there: Question
+    found: Named, behind: Named, lateness: Late, problem: Problem, there: Problem
 ) -> tuple[Named, Named]:
     """What was found once the force was put back, `behind`, and the delay or lag itself.
 
@@ -226,7 +228,7 @@ def settled(
         least = least_gain(effect, before, found.base.energy, less.energy, 0.0)
         if less.energy - left.energy < least:
             left, others = less, [t for i, t in enumerate(others) if i != number]
-    evidence = with_predictions(asked.evidence, left)
+    evidence = with_predictions(problem.evidence, left)
     now = fit((*left.terms, known.term), evidence, [*left.betas, np.zeros(0)], 6)
     # To first order the rest is only nearly itself.
     now = now._replace(

@@ -6,19 +6,19 @@ from ..identification.uncertainty import Estimate
 from ..terms.effects import traits
 from . import parameters as spelled, verification
 from .naming import Named
-from .question import Question
+from .problem import Problem
 
 
-def estimated(found: Named, asked: Question, rest) -> list[dict[str, Estimate]]:
+def estimated(found: Named, problem: Problem, rest) -> list[dict[str, Estimate]]:
     """The parameters of each term; their errors contain what another view of the machine changes.
 
     Views are a kernel of twice the width and the held-out recording. Where the force acts late,
     that is seen with the force put back, `rest`, by all terms but the last, which is the delay or
     lag itself.
     """
-    units = asked.evidence.motion.unit_names
-    ours = spelled.estimates(found.last, asked.block, units)
-    where, left = rest if traits(found.last.terms[-1]).late else (asked, found)
+    units = problem.evidence.motion.unit_names
+    ours = spelled.estimates(found.last, problem.block, units)
+    where, left = rest if traits(found.last.terms[-1]).late else (problem, found)
     late = [
         {
             name: own._replace(standard_error=np.hypot(own.standard_error, found.smoothed))

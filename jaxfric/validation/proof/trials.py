@@ -1,4 +1,4 @@
-"""One case: the truth sealed, the question answered blind, the oracle asked afterwards."""
+"""One case: the truth sealed, the recording explained blind, the oracle fitted afterwards."""
 
 import dataclasses
 import functools
@@ -15,7 +15,7 @@ from ...data.recording import Recording
 from ...explanation import Explanation, explain
 from ...explanation.evidence import gather, motion_of
 from ...explanation.forward import motion_error
-from ...explanation.question import ask, beside, opened
+from ...explanation.problem import across_reversals, problem_of, with_holdout
 from ...explanation.verification import residual
 from ...identification.documents import to_json
 from ...models import named
@@ -130,10 +130,10 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
         for hidden in (run.hidden, run.hidden_holdout)
     )
     run_less, holdout_less = _without(run.recording, first), _without(run.holdout, second)
-    asked = ask(run_less, structure)
-    known = beside(opened(run_less, asked) or asked, holdout_less)
-    for field in known.fields:
-        field.close()  # nobody asks for the candidates' columns
+    problem = problem_of(run_less, structure)
+    known = with_holdout(across_reversals(run_less, problem) or problem, holdout_less)
+    for candidates in known.candidate_sets:
+        candidates.close()  # nobody asks for the candidates' columns
     rows = known.evidence.width, known.delay, known.reversals
     measured = gather(motion_of(run.holdout), *rows).target
     return _norm(residual(known.base, known.held)) / _norm(measured)

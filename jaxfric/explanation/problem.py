@@ -1,0 +1,173 @@
+"""The regression problem of a recording: its rows, force and motion aligned, and the base's fit."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data.recording import Recording
+from ..terms.base import AbstractTerm
+from ..terms.effects import traits
+from ..terms.effects.late import TransportDelay
+from .candidates import CandidateSet
+from .chance import blocks
+from .evidence import Evidence, Motion, gather, motion_of
+from .predictions import with_predictions
+from .regression import Fit, fit
+from .reversals import yields
+
+# Alignments that differ by less than this part of a sample make no difference worth another search.
+ALIGNED = 0.1
+
+
+# Width of a kernel between the narrow one and one of twice its width, in parts of the narrow one.
+BETWEEN = 4 / 3
+# Rows through that kernel and through the widest; `None` where too few would be left.
+WideKernels = tuple[Evidence | None, Evidence | None]
+
+
+class Problem(NamedTuple):
+    """The rows of a recording, and the baseline fitted to them.
+
+    - `evidence`: the rows; `wide`, `between`: through kernels of twice and 4/3 of the width.
+    - `base`: the fit of the baseline, whose terms are `structure`.
+    - `block`: number of each row's block.
+    - `candidate_sets`: the candidates with their columns, for these rows first, then for other
+      rows of the same motion.
+    - `delay`: how much later the force was taken, s.
+    - `in_slip`: where rows reach across reversals, the problem with rows in slip alone.
+    - `held`: rows of the held-out recording, once everything has been chosen without it.
+    """
+
+    evidence: Evidence
+    wide: Evidence | None
+    between: Evidence | None
+    base: Fit
+    block: np.ndarray
+    structure: AbstractTerm
+    candidate_sets: tuple[CandidateSet, ...]
+    delay: float
+    in_slip: "Problem | None" = None
+    held: Evidence | None = None
+
+    @property
+    def reversals(self) -> bool:
+        """Whether rows reach across reversals, where the axis moves instead of sticking."""
+        return self.in_slip is not None
+
+    @property
+    def candidate_set(self) -> CandidateSet:
+        """The candidates for these rows, with their columns."""
+        return self.candidate_sets[0]
+
+    @property
+    def wide_kernels(self) -> WideKernels:
+        """The rows through kernels of 4/3 and of twice the width."""
+        return self.between, self.wide
+
+
+def problem_of(
+    recording: Recording | Motion,
+    structure: AbstractTerm,
+    known: Fit | None = None,
+    before: Problem | None = None,
+) -> Problem:
+    """The regression problem of a recording, force and motion aligned.
+
+    **Arguments:** `known`: the model to align by, by default the baseline; `before`: a problem of
+    the same motion and baseline, whose columns serve again if only the force has been shifted.
+    """
+    motion = motion_of(recording)
+    evidence = gather(motion)
+    if before is not None:
+        return _aligned(motion, evidence, structure, known, before.candidate_sets)
+    candidates = CandidateSet(evidence, structure)
+    try:
+        problem = _aligned(motion, evidence, structure, known, (candidates,))
+    except BaseException:
+        candidates.close()
+        raise
+    if problem.candidate_set is not candidates:
+        candidates.close()
+        problem = problem._replace(candidate_sets=problem.candidate_sets[:1])
+    return problem
+
+
+def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem | None:
+    """The problem with rows across reversals too; `None` where the axis sticks there."""
+    motion, width, delay = motion_of(recording), problem.evidence.width, problem.delay
+    if not yields(motion, problem.evidence, problem.base):
+        return None
+    evidence = gather(motion, width, delay, True)
+    wide = _wider(motion, evidence, delay, True)
+    structure, base, candidate_sets = problem.structure, problem.base, problem.candidate_sets
+    across = _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, True)
+    return across._replace(in_slip=problem)
+
+
+def with_holdout(problem: Problem, holdout: Recording | Motion) -> Problem:
+    """The problem with a held-out recording's rows, by the same kernel, s, and alignment, s."""
+    reach = problem.evidence.reach
+    held = gather(motion_of(holdout), delay=problem.delay, reversals=problem.reversals, reach=reach)
+    return problem._replace(held=held)
+
+
+def _aligned(motion, evidence: Evidence, structure, known, candidate_sets) -> Problem:
+    wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
+    known = fit([structure], evidence) if known is None else known
+    # To first order a delay is a column; the first estimate is good to a fifth of a sample.
+    for _ in range(3):
+        last = delay
+        delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
+        if abs(delay) > sample:
+            delay = -0.5 * sample
+        evidence = gather(motion, evidence.width, delay)
+        wide = None if wide is None else gather(motion, wide.width, delay)
+        if abs(delay - last) < 0.5 * ALIGNED * sample:
+            break
+    return _assembled(motion, evidence, wide, structure, known, candidate_sets, delay, False)
+
+
+def _assembled(
+    motion, evidence: Evidence, wide, structure, known: Fit, candidate_sets, delay, across
+) -> Problem:
+    base = fit([structure], evidence, known.betas[:1])
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    ours = next((some for some in candidate_sets if some.serves(evidence)), None)
+    ours = ours or CandidateSet(evidence, structure)
+    every = (ours, *(some for some in candidate_sets if some is not ours))
+    between = _wider(motion, evidence, delay, across, BETWEEN)
+    return Problem(evidence, wide, between, base, block, structure, every, delay)
+
+
+def _wider(
+    recording: Motion, narrow: Evidence, delay=0.0, across=False, factor=2.0
+) -> Evidence | None:
+    """The recording through a wider kernel; `None` if whole steps between the nodes allow none, or
+    too few rows would be left to judge by.
+    """
+    try:
+        wide = gather(recording, round(factor * narrow.width), delay, across)
+        blocks(wide.elapsed[wide.centre], wide.reach)
+    except ValueError:
+        return None
+    return wide if wide.width > narrow.width else None
+
+
+def _lateness(kernels: list[Evidence], known: Fit) -> float:
+    """How much earlier the force is than belongs to the same instant as the position, s.
+
+    A force that is held from sample to sample acts half a sample late; a controller that needs one
+    cycle for its computation adds one. Within one sample either way this is a matter of logging and
+    no fault; what is beyond is left to be found. Where the two kernels differ, the wider one
+    decides, since noise of the encoder moves the narrow one only.
+    """
+    sample, delays = kernels[0].limits.interval, []
+    index = [i for i, term in enumerate(known.terms) if not traits(term).delays]
+    terms, betas = [known.terms[i] for i in index], [known.betas[i] for i in index]
+    for evidence in kernels:
+        seen = with_predictions(evidence, known)
+        current = fit(terms, seen, betas, 6)
+        seen = with_predictions(seen, current)
+        both = fit([*terms, TransportDelay()], seen, [*current.betas, np.zeros(0)], 6)
+        delays.append(float(both.alphas[-1][0]))
+    return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
