@@ -11,7 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from jaxfric.cli.demo import EFFECT, SEED, SIZE
-from jaxfric.explanation import chance, evidence, regression, reversals
+from jaxfric.explanation import evidence, regression, reversals, significance
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.problem import problem_of
 from jaxfric.models import named
@@ -43,9 +43,11 @@ def draws(problem):
     """The best of all candidates by chance, and the gain of the winner."""
     seen = with_predictions(problem.evidence, problem.base)
     field = problem.candidate_set
-    judge = chance.Judge(problem.base, chance.blocks(seen.elapsed[seen.centre], seen.reach))
+    bootstrap = significance.BlockBootstrap(
+        problem.base, significance.blocks(seen.elapsed[seen.centre], seen.reach)
+    )
     scans = [
-        judge(field.columns(candidate, seen), candidate.effect.positive)
+        bootstrap(field.columns(candidate, seen), candidate.effect.positive)
         for candidate in field.candidates
     ]
     names = [candidate.effect.name for candidate in field.candidates]
@@ -56,7 +58,7 @@ def draws(problem):
     axis.axvline(scans[winner].gain[scans[winner].best], color="C3", label="as recorded")
     axis.set(xscale="log", xlabel="part of the residual explained", ylabel="draws")
     axis.legend(frameon=False)
-    save(figure, "chance")
+    save(figure, "significance")
 
 
 def turns():

@@ -13,7 +13,6 @@ import pytest
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.explanation import (
     candidates,
-    chance,
     contest,
     curves,
     evidence,
@@ -30,6 +29,7 @@ from jaxfric.explanation import (
     predictions,
     problem,
     regression,
+    significance,
     telling,
     timing,
     tones,
@@ -309,8 +309,8 @@ def tones_judged(seed, rows, tone):
     turned = 2 * np.pi * np.linspace(1.5, 70, 300)[:, None] * at
     waves = np.stack([np.sin(turned), np.cos(turned)], axis=1).astype(np.float32)
     fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
-    scan = chance.Judge(fit, block)(waves)
-    return scan.gain[scan.best], chance.thresholds(scan.drawn[None], chance.LEVEL)[0]
+    scan = significance.BlockBootstrap(fit, block)(waves)
+    return scan.gain[scan.best], significance.thresholds(scan.drawn[None], significance.LEVEL)[0]
 
 
 def test_a_tone_does_not_raise_its_own_hurdle():
@@ -328,14 +328,14 @@ def test_what_a_place_beside_the_right_one_leaves_is_no_noise():
     basis = np.linalg.qr(np.stack([np.ones(1450), np.sign(np.gradient(at))], axis=1))[0]
     fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
     cubes = ((at - np.linspace(-0.3, 0.3, 8)[:, None]) ** 3)[:, None].astype(np.float32)
-    scan = chance.Judge(fit, block)(cubes)
-    hurdle = chance.thresholds(scan.drawn[None], chance.LEVEL)[0]
+    scan = significance.BlockBootstrap(fit, block)(cubes)
+    hurdle = significance.thresholds(scan.drawn[None], significance.LEVEL)[0]
     assert 0.9 < scan.gain[scan.best] and hurdle < 0.1  # by what it leaves, 0.22
 
 
 def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
     found = np.array([tones_judged(seed, 20, 0.0) for seed in range(200)])
-    assert np.mean(found[:, 0] > chance.MOSTLY) > 0.3
+    assert np.mean(found[:, 0] > significance.MOSTLY) > 0.3
     assert np.mean(found[:, 0] > found[:, 1]) <= 0.03
 
 
@@ -374,8 +374,8 @@ def test_a_filtered_velocity_without_a_position_is_said_to_look_like_a_delay(hea
 def test_blocks_that_disagree_are_chance():
     block = np.repeat(np.arange(20), 5)
     one_way, either = np.ones(100), np.where(block % 2, 1.0, -1.0)
-    assert chance.agreement(np.stack([either, one_way]), block, 0) == pytest.approx(0.002)
-    assert chance.agreement(either[None], block, 0) > 0.1
+    assert significance.agreement(np.stack([either, one_way]), block, 0) == pytest.approx(0.002)
+    assert significance.agreement(either[None], block, 0) > 0.1
 
 
 def tried(seen):
@@ -795,7 +795,7 @@ def test_a_problem_that_cannot_be_set_up_leaves_no_work_behind(healthy, monkeypa
 def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healthy, monkeypatch):
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     assert posed.wide is not None
-    monkeypatch.setattr("jaxfric.explanation.chance.FEWEST", 10_000)
+    monkeypatch.setattr("jaxfric.explanation.significance.FEWEST", 10_000)
     assert problem._wider(evidence.motion_of(healthy[0]), posed.evidence) is None
 
 

@@ -13,11 +13,11 @@ from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled
-from .chance import LEVEL, Judge, blocks
 from .evidence import Evidence
 from .naming import LEAST_SHARE, LINEARITY
 from .predictions import with_predictions
 from .regression import RANK, Fit, fit, orthonormal, solve
+from .significance import LEVEL, BlockBootstrap, blocks
 
 
 class Baseline(NamedTuple):
@@ -158,7 +158,7 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
     own = own - beside @ (beside.T @ own)
     raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
     empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
-    scan = Judge(empty, block, seed)(raw.astype(np.float32))
+    scan = BlockBootstrap(empty, block, seed)(raw.astype(np.float32))
     p_value = float((1 + np.sum(scan.drawn >= scan.gain[0])) / (1 + len(scan.drawn)))
     if share < LEAST_SHARE or p_value > LEVEL:
         return None

@@ -86,7 +86,7 @@ def _signals(motion: Recording) -> dict[str, Any]:
 
 
 def scaled(raw: np.ndarray) -> np.ndarray:
-    """Columns `(G, J, k)` with largest value one, as a judge reads them: `(G, k, J)`, float32."""
+    """Columns `(G, J, k)` as the bootstrap reads them: largest value one, `(G, k, J)`, float32."""
     columns = np.ascontiguousarray(raw.transpose(0, 2, 1))
     size = np.maximum(columns.max(axis=2), -columns.min(axis=2))[..., None]
     return (columns / np.where(size > 0, size, 1.0)).astype(np.float32, copy=False)

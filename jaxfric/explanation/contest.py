@@ -8,10 +8,10 @@ import numpy as np
 
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
-from .chance import DRAWS, LEVEL, Judge, Scan, adjusted, blocks, thresholds
 from .evidence import Evidence
 from .outstanding import outstanding
 from .regression import Fit, fit
+from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
 from .threads import each
 from .tones import fast_tone
 
@@ -25,19 +25,19 @@ FINALISTS = 8
 class Trial(NamedTuple):
     """A candidate with its place on the grid, and how it did there.
 
-    `gain`: R²; `chance`: the mean of it by chance; `dimension`: how many of its columns are new;
-    `threshold`: the R² that would have been believed; `fresh`: the part of the term's force, in
+    `gain`: R²; `null_mean`: its mean over the draws; `dimension`: how many of its columns are new;
+    `threshold`: the R² from which it is significant; `new_part`: the part of the term's force, in
     amplitude, that the model cannot imitate.
     """
 
     candidate: Candidate
     beta: np.ndarray
     gain: float
-    chance: float
+    null_mean: float
     dimension: int
     p_value: float
     threshold: float
-    fresh: float
+    new_part: float
 
     def score(self, gain: float, size: float) -> float:
         """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978).
@@ -86,11 +86,11 @@ def contest(
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
-    judge = Judge(now, block, seed)
+    bootstrap = BlockBootstrap(now, block, seed)
 
     def scanned(candidate: Candidate) -> tuple[Scan, np.ndarray]:
         raw = field.columns(candidate, seen)
-        scan = judge(raw, candidate.effect.positive)
+        scan = bootstrap(raw, candidate.effect.positive)
         return scan, raw[scan.best : scan.best + 1]
 
     scans, best = zip(*each(scanned, field.candidates), strict=True)
@@ -98,7 +98,7 @@ def contest(
     p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
     least = thresholds(drawn, LEVEL)
     trials = [
-        _trial(judge, candidate, own, scan, float(p), float(limit))
+        _trial(bootstrap, candidate, own, scan, float(p), float(limit))
         for candidate, own, scan, p, limit in zip(
             field.candidates, best, scans, p_values, least, strict=True
         )
@@ -109,23 +109,23 @@ def contest(
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events, nor about a line among thousands: what
         # stands out has been tested.
-        scan = judge(raw)
+        scan = bootstrap(raw)
         own = raw[scan.best : scan.best + 1]
-        trials.append(_trial(judge, candidate, own, scan, 1 / (1 + DRAWS), np.inf))
+        trials.append(_trial(bootstrap, candidate, own, scan, 1 / (1 + DRAWS), np.inf))
     trials = [t for t in trials if t.dimension]
-    size = float(np.median([t.dimension / t.chance for t in trials]))
+    size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
     eligible = [t for t in trials if among(t.candidate.effect)]
     return Contest(trials, _finals(seen, now, eligible, size), size)
 
 
-def _trial(judge, candidate, own, scan, p_value, limit) -> Trial:
+def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
     best = scan.best
-    inside = np.einsum("gkj,glj->gkl", own, judge.fresh(own)[0])
-    fresh = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
+    inside = np.einsum("gkj,glj->gkl", own, bootstrap.new_columns(own)[0])
+    new_part = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
     return Trial(
-        candidate, candidate.betas[best], float(scan.gain[best]), float(scan.chance[best]),
-        int(scan.dimension[best]), p_value, limit, float(fresh),
+        candidate, candidate.betas[best], float(scan.gain[best]), float(scan.null_mean[best]),
+        int(scan.dimension[best]), p_value, limit, float(new_part),
     )  # fmt: skip
 
 

@@ -56,7 +56,7 @@ def explain(
 
     **Arguments:**
 
-    - `recording`, and `holdout`, which is only judged on: signals of shape `(N,)`.
+    - `recording`, and `holdout`, for validation only: signals of shape `(N,)`.
     - `baseline`: a model's name or a sum of terms, whose parameters are fitted; a model or an
       identification, whose values are tested first (`parameter_mismatch`); another
       simulator's force along the recorded motion (`jf.simulators.Known`, any function from a
@@ -225,7 +225,7 @@ def _explain(
     else:
         doing("looking for what is missing")
         problem, found, rest = _search(motion, known, problem, seed)
-        doing("judging the values")
+        doing("testing the baseline's values")
         wrong = _wrong(known, rest, recording, seed)
         if known.model is not None and (wrong is not None or fixed):
             free = () if wrong is None else tuple(wrong.moved)
@@ -235,7 +235,7 @@ def _explain(
     doing("predicting with the improved model")
     better = improved(first, found, rest, problem, figures)
     if holdout is not None:
-        doing("judging by the held-out recording")
+        doing("validating on the held-out recording")
         check_signals(better.found, recording, holdout)
         better, problem = confirmed(better, problem, there, figures)
     doing("locating what is left")

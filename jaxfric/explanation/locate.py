@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from .candidates import scaled
-from .chance import Judge, Scan, adjusted, blocks
 from .evidence import Evidence
 from .lines import Lines, line_frequencies
 from .regression import Fit, fit
+from .significance import BlockBootstrap, Scan, adjusted, blocks
 from .threads import each
 
 # Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
@@ -44,17 +44,17 @@ class Place(NamedTuple):
 def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
     """Every coordinate, the largest share first; `evidence` with the fit's predictions."""
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    judge = Judge(now, block, seed)
+    bootstrap = BlockBootstrap(now, block, seed)
 
     def over(coordinate) -> _Scanned:
         name, (value, factor, kind) = coordinate
         knots = _knots(name, value[evidence.centre])
         raw = _hats(evidence, value, factor, kind, knots)
-        return _Scanned(name, judge(scaled(raw[None])), raw, knots)
+        return _Scanned(name, bootstrap(scaled(raw[None])), raw, knots)
 
     def along(name: str) -> _Scanned:
         grid = line_frequencies(evidence, name)
-        scan = judge(scaled(Lines(name, False).columns(evidence, grid)))
+        scan = bootstrap(scaled(Lines(name, False).columns(evidence, grid)))
         return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
 
     there = {"position": evidence.motion.position is not None, "time": evidence.clock}
@@ -67,7 +67,7 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
 
 
 class _Scanned(NamedTuple):
-    """A coordinate judged: its name and how it did; the curve's hats `(J, K)`, or a line's peak."""
+    """The scan of a coordinate; the curve's hats `(J, K)` with their knots, or a line's peak."""
 
     name: str
     scan: Scan

@@ -11,7 +11,6 @@ from ..data.recording import Recording
 from ..models import Model
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet
-from .chance import DRAWS, LEVEL, blocks
 from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence, Motion
 from .intervals import left_out
@@ -19,6 +18,7 @@ from .plausible import machines, nil
 from .predictions import with_predictions
 from .problem import BETWEEN, WideKernels
 from .regression import Fit, fast, fit, without
+from .significance import DRAWS, LEVEL, blocks
 
 # A term is believed if it accounts for this much of the mean-square residual, too: below it, the
 # amplitude is under a sixth of the residual's, where held forces, counts and smoothed velocities

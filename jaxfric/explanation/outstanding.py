@@ -5,9 +5,9 @@ import numpy as np
 from ..terms.effect import Effect, Residual
 from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
-from .chance import LEVEL
 from .evidence import Evidence
 from .regression import Fit
+from .significance import LEVEL
 
 
 def outstanding(evidence: Evidence, now: Fit) -> list[Candidate]:

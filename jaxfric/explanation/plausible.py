@@ -8,10 +8,10 @@ from ..terms.base import leaves
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
 from . import parameters as spelled
-from .chance import blocks
 from .contest import Contest, Finalist
 from .evidence import Evidence
 from .regression import Fit, fit
+from .significance import blocks
 
 # Where the rows tell an inertia badly and ask for somewhat more than there is, they are asked about
 # all there is; a hundredth less, not to be refused by rounding.

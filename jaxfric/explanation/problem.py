@@ -9,11 +9,11 @@ from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from ..terms.effects.late import TransportDelay
 from .candidates import CandidateSet
-from .chance import blocks
 from .evidence import Evidence, Motion, gather, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .reversals import yields
+from .significance import blocks
 
 # Alignments that differ by less than this part of a sample make no difference worth another search.
 ALIGNED = 0.1

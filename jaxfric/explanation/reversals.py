@@ -13,9 +13,9 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..models import Model
-from .chance import DRAWS
 from .evidence import Evidence, Motion, motion_of
 from .regression import Fit
+from .significance import DRAWS
 
 # Part of the way from one break-away level to the other that counts, on both sides of the middle:
 # friction levels, which the base knows to a few parts in a hundred, lie well outside.

@@ -14,7 +14,6 @@ from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import parameters as spelled, verification
 from .baseline import Baseline, Mismatch, freed
 from .bins import unit
-from .chance import LEVEL
 from .curves import curves
 from .doubts import NOT_BETTER, accelerates, doubts, not_better
 from .errors import document, filtered_errors
@@ -30,6 +29,7 @@ from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit
 from .sentences import changed_sentence, mismatch_sentence, sentence
+from .significance import LEVEL
 from .views import estimated
 
 

@@ -16,13 +16,13 @@ from ..data.recording import Recording
 from ..terms.effect import Effect
 from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
-from .chance import BLOCKS, LEVEL, agreement
 from .contest import RIVAL, Trial
 from .evidence import Motion, gather, motion_of
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit, without
+from .significance import BLOCKS, LEVEL, agreement
 
 Undo = Callable[[Recording, float], Recording]
 

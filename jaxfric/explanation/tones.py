@@ -9,10 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .chance import LEVEL
 from .evidence import Evidence
 from .lines import AT_ONCE, OVERSAMPLING, angle, line_frequencies
 from .regression import Fit
+from .significance import LEVEL
 
 # Part of the motion's variance in a tone's resolution cell from which the tone is the motion's own:
 # an unrelated one holds two of some thousand values.

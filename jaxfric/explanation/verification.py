@@ -196,7 +196,7 @@ def smallest_visible(contest: Contest, now: Fit) -> dict[str, float]:
         least = max(LEAST_SHARE, trial.threshold)
         if not np.isfinite(least):
             continue
-        size = level * np.sqrt(least) / max(trial.fresh, 1e-3)
+        size = level * np.sqrt(least) / max(trial.new_part, 1e-3)
         name = trial.candidate.effect.name
         found[name] = min(size, found.get(name, np.inf))
     return found

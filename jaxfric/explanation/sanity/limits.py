@@ -8,7 +8,7 @@ from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.prediction import in_motion
 from ...terms import KNOWN_FORCE
-from ..chance import FEWEST
+from ..significance import FEWEST
 
 # Of the mismatch in the samples that ask for more: what a clip leaves of it, and of all of it; and
 # the part of the excess that arrives. A soft knee leaves more, and gives more.

@@ -190,12 +190,12 @@ def _findings(looked: Looked) -> list[Finding]:
         if not check.wrong or check.effect not in _EQUATIONS:
             continue
         value = check.value
-        chance = math.erfc(abs(float(value.value) / float(value.standard_error)) / math.sqrt(2))
+        p_value = math.erfc(abs(float(value.value) / float(value.standard_error)) / math.sqrt(2))
         found.append(
             Finding(
                 check.effect, _EQUATIONS[check.effect], f"{check.text} {share:.0%} of the "
                 "unexplained force goes with it.", check.confusable, check.separate_by,
-                {check.parameter: value}, share, None, chance, attribute=check.attribute,
+                {check.parameter: value}, share, None, p_value, attribute=check.attribute,
             )
         )  # fmt: skip
     return found

@@ -9,10 +9,10 @@ from ...data.recording import Recording
 from ...models import Model
 from ...simulators import AbstractSimulator
 from ...terms import KNOWN_FORCE
-from ..chance import blocks
 from ..evidence import Evidence, gather, motion_of
 from ..naming import LINEARITY
 from ..regression import RANK, orthonormal
+from ..significance import blocks
 
 
 class Part(NamedTuple):

@@ -1,9 +1,9 @@
-"""What blocks of a residual say about columns, and what they would say by chance.
+"""Significance of columns for a residual, by a wild block bootstrap.
 
-With orthonormal columns E, orthogonal to all that the model can do already, and blocks b of the
-residual r, the scores g_b = E_bᵀ r_b are all that is needed: R² = |Σ g_b|²/|r|², and a draw of
-signs s_b has |Σ s_b g_b|² in its place (wild block bootstrap: Wu 1986; Shao 2010). Looking in many
-places is paid for by the largest statistic of each draw (Westfall & Young 1993).
+With orthonormal columns E, orthogonal to the span of the model, and blocks b of the residual r, the
+scores g_b = E_bᵀ r_b are all that is needed: R² = |Σ g_b|²/|r|², and a draw of signs s_b has
+|Σ s_b g_b|² in its place (Wu 1986; Shao 2010). Many tests at once are corrected for by the largest
+statistic of each draw (Westfall & Young 1993).
 """
 
 from typing import NamedTuple
@@ -12,37 +12,37 @@ import numpy as np
 
 from .regression import Fit
 
-# Few enough that what wanders slowly, as hidden loads do, stays within a block on most records:
-# shorter blocks take it for structure. Enough that the signs have 2²⁴ patterns.
+# Few enough that a slow hidden load stays within a block on most records: shorter blocks take it
+# for structure. Enough that the signs have 2²⁴ patterns.
 BLOCKS = 24
-# A block is this many half-widths of the kernel long, so that neighbours hardly share noise; on
-# short records half of that.
+# Length of a block in half-widths of the kernel, so that neighbours hardly share noise; half of it
+# on short records.
 BLOCK_LENGTH = 8
-# What is believed would be as large by chance somewhere in one case of a hundred.
+# Family-wise level of significance.
 LEVEL = 0.01
-# Fewer blocks have fewer patterns of signs than a p-value of 1 % needs to rest on.
+# Fewer blocks have too few patterns of signs for a p-value of 1 %.
 FEWEST = 8
 DRAWS = 499
-# Candidates of which the model imitates all but this part, in amplitude, are not told from it: to
-# be seen at a tenth of the force they would have to be five times the force.
+# A column of which the model imitates all but this part, in amplitude, is not new: to be seen at a
+# tenth of the force it would have to be five times the force.
 NEW = 0.02
-# What takes half of the residual at one place would, its signs flipped, do nearly as well at the
-# next place, as a tone that begins anew has a frequency close by. Then the rest is flipped, with
-# the power of all the residual.
+# A group that removes half of the residual would, its signs flipped, do nearly as well at the next
+# grid point: a tone that begins anew has a frequency close by. Then the remainder is flipped,
+# scaled to the power of the whole residual.
 MOSTLY = 0.5
-# Columns that are judged together: they fill the cache and no more.
+# Columns that are tested together: they fill the cache and no more.
 CHUNK = 64
 
 
 class Scan(NamedTuple):
     """How well each of many groups of columns explains a residual.
 
-    `gain`: R² of each, `(G,)`; `chance`: the mean R² by chance, `(G,)`; `drawn`: the highest R²
+    `gain`: R² of each, `(G,)`; `null_mean`: mean R² of the draws, `(G,)`; `drawn`: the highest R²
     of each draw, `(D,)`; `dimension`: columns of each that are new, `(G,)`.
     """
 
     gain: np.ndarray
-    chance: np.ndarray
+    null_mean: np.ndarray
     drawn: np.ndarray
     dimension: np.ndarray
 
@@ -52,8 +52,8 @@ class Scan(NamedTuple):
         return int(np.argmax(self.gain))
 
 
-class Judge:
-    """A residual, what the model spans, and the signs to flip it by; for one fit."""
+class BlockBootstrap:
+    """Residual and span of one fit, and the signs by which the residual's blocks are flipped."""
 
     def __init__(self, fit: Fit, block: np.ndarray, seed: int = 0):
         basis = fit.basis()
@@ -64,35 +64,37 @@ class Judge:
         self.residual = (residual / self.scale).astype(np.float32)
         count = int(block[-1]) + 1
         self.members = (block[:, None] == np.arange(count)[None, :]).astype(np.float32)
-        self.votes = self.members * self.residual[:, None]
+        self.by_block = self.members * self.residual[:, None]
         signs = np.random.default_rng(seed).integers(0, 2, (DRAWS, count)) * 2.0 - 1.0
         self.signs = signs.astype(np.float32)
 
     def __call__(self, raw: np.ndarray, positive: bool = False) -> Scan:
-        """Judge groups of columns, `(G, k, J)`; `positive`: a single one only with that sign."""
-        scan = self._scan(raw, self.votes, positive)
+        """Scan groups of columns, `(G, k, J)`; `positive`: single columns by that sign only."""
+        scan = self._scan(raw, self.by_block, positive)
         if len(raw) == 1 or scan.gain[scan.best] < MOSTLY:
             return scan
-        own = self.fresh(raw[scan.best : scan.best + 1])[0][0]
+        own = self.new_columns(raw[scan.best : scan.best + 1])[0][0]
         left = self.residual - (own @ self.residual) @ own
         left /= np.linalg.norm(left)
         rest = self._scan(raw, self.members * left[:, None], positive).drawn
-        # What a place beside the right one leaves is not noise either: whichever asks for less.
+        # The remainder beside the right grid point is not noise either: take the lower threshold.
         lower = np.quantile(rest, 1 - LEVEL) < np.quantile(scan.drawn, 1 - LEVEL)
         return scan._replace(drawn=rest) if lower else scan
 
-    def _scan(self, raw, votes, positive) -> Scan:
+    def _scan(self, raw, by_block, positive) -> Scan:
         size = max(1, CHUNK // raw.shape[1])
-        parts = [self._chunk(raw[i : i + size], votes, positive) for i in range(0, len(raw), size)]
-        gain, chance, drawn, dimension = zip(*parts, strict=True)
+        parts = [
+            self._chunk(raw[i : i + size], by_block, positive) for i in range(0, len(raw), size)
+        ]
+        gain, null_mean, drawn, dimension = zip(*parts, strict=True)
         return Scan(
-            np.concatenate(gain), np.concatenate(chance), np.max(drawn, axis=0),
+            np.concatenate(gain), np.concatenate(null_mean), np.max(drawn, axis=0),
             np.concatenate(dimension),
         )  # fmt: skip
 
-    def _chunk(self, raw, votes, positive):
-        own, dimension = self.fresh(raw)
-        scores = own @ votes
+    def _chunk(self, raw, by_block, positive):
+        own, dimension = self.new_columns(raw)
+        scores = own @ by_block
         fitted = scores.sum(axis=2)
         noise = self._unexplained(own, scores, fitted)
         g, k, b = noise.shape
@@ -103,10 +105,10 @@ class Judge:
         return np.sum(fitted**2, axis=1), power.mean(axis=1), power.max(axis=0), dimension
 
     def _unexplained(self, own, scores, fitted):
-        """The scores of what the group itself leaves, each block freed of its own pull on the fit.
+        """Scores of the group's residual, each block without its own influence on the fit.
 
-        (I − H_b)⁻¹ (g_b − H_b a), as the delete-one-block jackknife has it (Bell & McCaffrey
-        2002); a block with half of the leverage has no others to be judged by and keeps g_b.
+        (I − H_b)⁻¹ (g_b − H_b a): the delete-one-block jackknife (Bell & McCaffrey 2002). A block
+        with half of the leverage has no others to compare with and keeps g_b.
         """
         k = own.shape[1]
         lever = np.zeros((len(own), scores.shape[2], k, k), own.dtype)
@@ -120,8 +122,8 @@ class Judge:
         free = np.linalg.solve(np.eye(k, dtype=own.dtype) - safe, left[..., None])[..., 0]
         return np.where(alone[:, None], scores, free.transpose(0, 2, 1))
 
-    def fresh(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Orthonormal columns of what each group adds, `(G, k, J)`, and how many, `(G,)`."""
+    def new_columns(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Orthonormal columns that each group adds, `(G, k, J)`, and how many, `(G,)`."""
         size = np.sqrt(np.einsum("gkj,gkj->gk", raw, raw))
         own = raw - (raw @ self.basis) @ self.basis.T
         dimension = np.zeros(len(raw), int)
@@ -153,10 +155,10 @@ def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
 
 
 def agreement(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
-    """How likely the blocks agree by chance as much as they do on the best of several tries.
+    """p-value of how much the blocks agree on the best of several models, by random signs.
 
-    **Arguments:** `changes`, what each try takes off the squared residual, N², `(T, J)`; `block`
-    of each row, `(J,)`; `seed` of the signs.
+    **Arguments:** `changes`, by how much each model lowers the squared residual, N², `(T, J)`;
+    `block` of each row, `(J,)`; `seed` of the signs.
     """
     count = int(block[-1]) + 1
     sums = np.stack([np.bincount(block, change, count) for change in changes])
@@ -167,7 +169,7 @@ def agreement(changes: np.ndarray, block: np.ndarray, seed: int) -> float:
 
 
 def adjusted(gains: np.ndarray, drawn: np.ndarray) -> np.ndarray:
-    """p-values of several statistics, paid for by the largest of each draw, `(C,)`.
+    """p-values of several statistics, corrected by the largest of each draw, `(C,)`.
 
     Cube roots make sums of squares nearly normal (Wilson & Hilferty 1931); centred and scaled by
     the draws, curves of any number of knots and the highest of any number of lines compare.
