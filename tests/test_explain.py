@@ -20,7 +20,6 @@ from jaxfric.explanation import (
     holdout,
     improvement,
     intervals,
-    lines,
     locate,
     naming,
     outstanding,
@@ -30,9 +29,9 @@ from jaxfric.explanation import (
     problem,
     regression,
     significance,
+    spectral_lines,
     telling,
     timing,
-    tones,
     verification,
 )
 from jaxfric.explanation.sentences import sentence
@@ -380,9 +379,9 @@ def test_blocks_that_disagree_are_chance():
 
 def tried(seen):
     """The tones to try that the motion does not have, and those that it has; and their spacing."""
-    (foreign, none), (own, part) = tones.tones_to_try(seen)
-    assert (none, part) == (0.0, tones.ALL)
-    frequencies = lines.line_frequencies(seen, "time")
+    (foreign, none), (own, part) = spectral_lines.time_frequencies(seen)
+    assert (none, part) == (0.0, spectral_lines.ALL)
+    frequencies = spectral_lines.line_frequencies(seen, "time")
     assert len(foreign) + len(own) <= len(frequencies)
     return foreign, own, frequencies[1] - frequencies[0]
 
@@ -494,7 +493,7 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
 
     alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
     (found,) = named(alone)
-    assert found.trial.candidate.least == tones.ALL
+    assert found.trial.candidate.least == spectral_lines.ALL
     assert found.trial.beta[0] == pytest.approx(rates[0], rel=0.01)
     # With a second like it the motion may drive both.
     assert not named(planted(alone, terms.PeriodicDisturbance(), (1.0, 1.5), (rates[4],)))
@@ -504,15 +503,15 @@ def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeyp
     structure = models.named("gaussian")
     run = planted(healthy[0], terms.PeriodicDisturbance(), (0.3, 0.4), (31.37,))
     posed = problem.problem_of(run, structure)
-    monkeypatch.setattr(tones, "line_frequencies", lambda *_: np.array([5.0, 20.0]))
-    found = tones.fast_tone(posed.evidence, posed.base)
+    monkeypatch.setattr(spectral_lines, "line_frequencies", lambda *_: np.array([5.0, 20.0]))
+    found = spectral_lines.fast_tone(posed.evidence, posed.base)
     assert np.min(np.abs(found - 31.37)) < 0.02 and np.ptp(found) < 0.1
     # Noise has none, and what a fit leaves of a tone that it knows has none at that place.
     quiet = problem.problem_of(healthy[0], structure)
-    assert not len(tones.fast_tone(quiet.evidence, quiet.base))
+    assert not len(spectral_lines.fast_tone(quiet.evidence, quiet.base))
     known = (terms.PeriodicDisturbance(), np.array([31.37]))
     both = regression.fit([structure, known[0]], posed.evidence, [posed.base.betas[0], known[1]], 2)
-    assert not len(tones.fast_tone(posed.evidence, both))
+    assert not len(spectral_lines.fast_tone(posed.evidence, both))
 
 
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
@@ -802,7 +801,7 @@ def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healt
 def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
     gaussian = models.named("gaussian")
     scanned = evidence.gather(evidence.motion_of(healthy[0]))
-    pitch = 1 / (1.5 * lines.line_frequencies(scanned, "position")[-1])
+    pitch = 1 / (1.5 * spectral_lines.line_frequencies(scanned, "position")[-1])
     run = planted(healthy[0], terms.Cogging(), (3.0, 1.0), (pitch,))
     posed = problem.problem_of(run, gaussian)
     seen = predictions.with_predictions(posed.evidence, posed.base)

@@ -12,10 +12,9 @@ from ..terms.effect import Effect, View, inside
 from ..terms.effects import EFFECTS
 from ..units import TURNS
 from .evidence import NODES, Evidence
-from .lines import Lines, line_frequencies
 from .predictions import PREDICTED
+from .spectral_lines import SpectralLines, line_frequencies, time_frequencies
 from .threads import begin
-from .tones import tones_to_try
 
 
 class Candidate(NamedTuple):
@@ -27,7 +26,7 @@ class Candidate(NamedTuple):
     effect: Effect
     term: AbstractTerm
     betas: np.ndarray
-    lines: Lines | None = None
+    lines: SpectralLines | None = None
     least: float = 0.0
 
     def columns(self, evidence: Evidence) -> np.ndarray:
@@ -132,7 +131,7 @@ def _placed(
     if waves is None:
         yield Candidate(effect, term, effect.grid(term, seen))
     elif waves.coordinate == "time":
-        for tones, least in tones_to_try(evidence):
+        for tones, least in time_frequencies(evidence):
             yield from at_frequencies(effect, term, tones, least)
     else:
         periods = 1 / line_frequencies(evidence, "position")
@@ -150,7 +149,7 @@ def at_frequencies(
     effect: Effect, term: AbstractTerm, values: np.ndarray, least: float = 0.0
 ) -> list[Candidate]:
     """A wave at some periods or frequencies, `(G,)`; none where there are none."""
-    lines = Lines(*effect.waves(term))
+    lines = SpectralLines(*effect.waves(term))
     return [Candidate(effect, term, values[:, None], lines, least)] if len(values) else []
 
 

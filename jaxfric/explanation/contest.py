@@ -12,8 +12,8 @@ from .evidence import Evidence
 from .outstanding import outstanding
 from .regression import Fit, fit
 from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
+from .spectral_lines import fast_tone
 from .threads import each
-from .tones import fast_tone
 
 # A rival whose score is this close cannot be told apart: odds of e⁵, 150 to 1 (Kass & Raftery
 # 1995 call ten on twice this scale very strong).

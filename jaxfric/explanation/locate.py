@@ -11,9 +11,9 @@ import numpy as np
 
 from .candidates import scaled
 from .evidence import Evidence
-from .lines import Lines, line_frequencies
 from .regression import Fit, fit
 from .significance import BlockBootstrap, Scan, adjusted, blocks
+from .spectral_lines import SpectralLines, line_frequencies
 from .threads import each
 
 # Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
@@ -54,7 +54,7 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
 
     def along(name: str) -> _Scanned:
         grid = line_frequencies(evidence, name)
-        scan = bootstrap(scaled(Lines(name, False).columns(evidence, grid)))
+        scan = bootstrap(scaled(SpectralLines(name, False).columns(evidence, grid)))
         return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
 
     there = {"position": evidence.motion.position is not None, "time": evidence.clock}
@@ -100,7 +100,7 @@ def repeated(places: list[Place], now: Fit, held: Evidence) -> list[Place]:
     left = there.residual - basis @ (basis.T @ there.residual)
 
     def again(place: Place) -> bool:
-        # Lines are no coordinate of a curve.
+        # A spectral line is no coordinate of a curve.
         if place.coordinate.startswith("time") or place.coordinate not in known:
             return True
         knots, heights = place.curve
