@@ -28,10 +28,12 @@ from jaxfric.explanation import (
     predictions,
     problem,
     regression,
+    reported,
     significance,
     spectral_lines,
-    telling,
+    structure,
     timing,
+    verdict,
     verification,
 )
 from jaxfric.explanation.sentences import sentence
@@ -248,8 +250,8 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
 
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -30))
     lateness = overlooked(jax.tree.map(lambda x: x[:-32], run))
-    assert lateness.taken.trial.candidate.effect.name == "transport_delay"
-    assert lateness.taken.rivals == () and lateness.taken.p_value <= contest.LEVEL
+    assert lateness.selected.trial.candidate.effect.name == "transport_delay"
+    assert lateness.selected.rivals == () and lateness.selected.p_value <= contest.LEVEL
     assert lateness.time == pytest.approx(30e-3, abs=1.1e-3)  # within a sample, as above
     assert overlooked(healthy[0]) is None
     term, alpha, beta = CASES["cogging"]
@@ -537,10 +539,10 @@ def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     term, alpha, beta = CASES["friction_step"]
     found = explain(planted(healthy[0], term, alpha, beta), "gaussian")
     base = problem.problem_of(healthy[0], models.named("gaussian")).base
-    places = telling._everywhere([], found.findings, base)
+    places = structure.with_findings([], found.findings, base)
     assert [place["coordinate"] for place in places] == [EFFECTS["friction_step"].coordinates[0]]
     assert places[0]["share"] == found.findings[0].share and places[0]["size"] > 0
-    assert telling._everywhere(places, found.findings, base) == places
+    assert structure.with_findings(places, found.findings, base) == places
 
 
 def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
@@ -659,14 +661,14 @@ def test_a_held_out_recording_of_another_rate_is_seen_through_the_same_kernel(he
 def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
     term, alpha, beta = CASES["sticky_spot"]
     run = planted(healthy[0], term, alpha, beta)
-    structure = models.named("gaussian")
+    gaussian = models.named("gaussian")
     for held, there in ((planted(healthy[1], term, alpha, beta), True), (healthy[1], False)):
-        posed = problem.with_holdout(problem.problem_of(run, structure), held)
+        posed = problem.with_holdout(problem.problem_of(run, gaussian), held)
         seen = predictions.with_predictions(posed.evidence, posed.base)
         places = {place.coordinate: place for place in locate.locate(seen, posed.base)}
         spot = places["position_by_direction"]
         assert spot.p_value <= 0.01 and spot.share > 0.1
-        assert (telling._lasting([spot], posed.base, posed) == [spot]) is there
+        assert (structure.lasting([spot], posed.base, posed) == [spot]) is there
 
 
 def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(healthy):
@@ -684,12 +686,12 @@ def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(h
         noise = regression.fast(of.base)
         places = [p._replace(size=noise) for p in places]
         plain = places[0]._replace(coordinate="velocity")
-        kept = telling._through_wide([*places, plain], of.base, of.wide, 0)
+        kept = structure.through_wide([*places, plain], of.base, of.wide, 0)
         judged[name] = {p.coordinate for p in kept}
         # What is larger than the noise is no part of it.
         large = [p._replace(size=1.1 * noise) for p in places if p.coordinate != "force_rate"]
-        assert telling._through_wide(large, of.base, of.wide, 0) == large
-        assert telling._through_wide(places, of.base, None, 0) == places
+        assert structure.through_wide(large, of.base, of.wide, 0) == large
+        assert structure.through_wide(places, of.base, None, 0) == places
     assert judged["healthy"] == {"velocity"}
     assert judged["pulled"] >= {"velocity", "acceleration"}
 
@@ -709,8 +711,8 @@ def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(h
 )
 def test_a_place_is_told_with_its_unit(coordinate, curve, detail):
     curve = tuple(np.array(values) for values in curve)
-    place = locate.Place(coordinate, 0.5, 1.0, 0.002, 0.4, curve)
-    assert telling._where(place, {"force": "N", "position": "mm"})["detail"] == detail
+    place = locate.Structure(coordinate, 0.5, 1.0, 0.002, 0.4, curve)
+    assert structure.document(place, {"force": "N", "position": "mm"})["detail"] == detail
 
 
 def test_the_map_of_a_late_force_is_over_its_rate(healthy):
@@ -745,7 +747,7 @@ def test_what_the_held_out_recording_did_not_record_is_not_asked(healthy):
     posed = problem.with_holdout(problem.problem_of(run, models.named("gaussian")), healthy[1])
     seen = predictions.with_predictions(posed.evidence, posed.base)
     places = {place.coordinate: place for place in locate.locate(seen, posed.base)}
-    assert telling._lasting([places["load"]], posed.base, posed) == [places["load"]]
+    assert structure.lasting([places["load"]], posed.base, posed) == [places["load"]]
 
 
 def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
@@ -846,8 +848,8 @@ def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     floor = regression.fast(posed.base)
     empty = (np.zeros(0), np.zeros(0))
-    wandering = [locate.Place("time", 0.2, f * floor, 0.002, np.nan, empty) for f in (0.9, 1.1)]
-    assert telling._lasting(wandering, posed.base, posed) == wandering[1:]
+    wandering = [locate.Structure("time", 0.2, f * floor, 0.002, np.nan, empty) for f in (0.9, 1.1)]
+    assert structure.lasting(wandering, posed.base, posed) == wandering[1:]
 
 
 def test_the_held_out_recording_chooses_nothing(healthy):
@@ -937,15 +939,15 @@ def test_a_step_is_dated_between_two_rows(healthy):
     times = np.asarray(seen.motion.time)[seen.centre]
     widest = int(np.argmax(np.diff(times)))
     middle = Estimate(np.float64(times[widest : widest + 2].mean()), np.float64(1e-6), "s")
-    found = telling._dated({"step_time": middle}, "step_time", seen)["step_time"].standard_error
+    found = reported.dated({"step_time": middle}, "step_time", seen)["step_time"].standard_error
     assert found == pytest.approx((np.diff(times)[widest] + seen.reach) / np.sqrt(12))
 
 
 def test_terms_that_share_what_they_remove_stand_in_for_another():
-    assert telling._stand_ins([0.2, 0.2, 0.1], 0.7)
-    assert not telling._stand_ins([0.4, 0.2, 0.05], 0.7)
+    assert verdict.stand_ins([0.2, 0.2, 0.1], 0.7)
+    assert not verdict.stand_ins([0.4, 0.2, 0.05], 0.7)
     # Two effects may overlap: a strong excitation of one is seldom orthogonal to the other.
-    assert not telling._stand_ins([0.3, 0.1], 0.9)
+    assert not verdict.stand_ins([0.3, 0.1], 0.9)
 
 
 def both_ways(values, errors, names=("force",) * 2, joined=parameters.with_elsewhere):
@@ -1024,7 +1026,7 @@ def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(
         fit = {"force_error": {"before": before, "after": after}, "noise_floor": floor}
         fit["holdout_force_error"] = held and {"before": 0.1, "after": held}
         shares = {name: moment if name == "friction_step" else 0.1 for name in named}
-        return telling.rough(fit, shares)
+        return verdict.rough(fit, shares)
 
     # Four times the noise, and beside findings that leave half of the mismatch 1.25 times.
     assert rough(0.09) and not rough(0.07)

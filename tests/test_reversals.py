@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxfric import Recording, explain
-from jaxfric.explanation import evidence, explaining, naming, regression, reversals
+from jaxfric.explanation import evidence, naming, regression, reversals, search
 from jaxfric.explanation.problem import across_reversals, problem_of
 from jaxfric.models import named
 from jaxfric.terms.effects import EFFECTS
@@ -116,7 +116,7 @@ def hilly(seed=0):
 
 def searched(recording):
     problem = problem_of(recording, named("symmetric-coulomb-viscous"))
-    return explaining._searched(recording, problem, 0)
+    return search._selected(evidence.motion_of(recording), problem, 0)
 
 
 def names(found):

@@ -1,6 +1,5 @@
 """What the pictures of an explanation are drawn from, as plain lists."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,8 @@ from ..models import Model
 from ..terms import KNOWN_FORCE
 from .bins import Axis, Bins, axis
 from .evidence import Evidence
-from .locate import Place
+from .improvement import Improved
+from .locate import Structure
 from .predictions import with_predictions
 from .regression import Fit
 from .verification import residual
@@ -22,36 +22,34 @@ GAP = 2.5
 FEWEST = 20
 
 
-def curves(
-    places: list[Place],
-    before: Fit,
-    after: Fit,
-    evidence: Evidence,
-    held: Evidence | None,
-    units: Mapping[str, str],
-    models: tuple[Model, Model],
-    rephased: frozenset[int] = frozenset(),
-) -> dict[str, Any]:
-    """Mismatch map, force over time on both recordings, and friction, before and after."""
+def curves(found: list[Structure], better: Improved, models: tuple[Model, Model]) -> dict[str, Any]:
+    """Mismatch map, force over time on both recordings, and friction, before and after.
+
+    **Arguments:** `found`: the baseline's structure to show; `better`: what is reported; `models`,
+    before and after.
+    """
+    problem, selection = better.findings.recorded
+    evidence, before, after = problem.evidence, better.first, selection.last
+    units = evidence.motion.unit_names
     seen = with_predictions(evidence, after)
     drawn = {
         "units": dict(units),
-        "map": [_mapped(place, before, after, seen, units) for place in places],
+        "map": [_mapped(each, before, after, seen, units) for each in found],
         "time": _series(evidence, before, after),
         "friction": _friction(models, evidence, after),
     }
-    if held is not None:
-        drawn["holdout"] = _series(held, before, after, rephased)
+    if problem.held is not None:
+        drawn["holdout"] = _series(problem.held, before, after, selection.rephased)
     return drawn
 
 
-def _mapped(place: Place, before: Fit, after: Fit, seen: Evidence, units) -> dict[str, Any]:
+def _mapped(found: Structure, before: Fit, after: Fit, seen: Evidence, units) -> dict[str, Any]:
     """Mean residual in bins along one coordinate; a line is folded onto one period."""
-    lined = place.coordinate.endswith("_lines")
-    along = axis(place.coordinate, seen, units, 1 / place.peak if lined else None)
+    lined = found.coordinate.endswith("_lines")
+    along = axis(found.coordinate, seen, units, 1 / found.peak if lined else None)
     bins = Bins(along)
     return {
-        "name": place.coordinate,
+        "name": found.coordinate,
         "coordinate": along.label,
         "unit": along.unit,
         "at": bins.at.tolist(),

@@ -12,12 +12,13 @@ from ..data.recording import Recording
 from . import parameters as spelled, verification
 from .baseline import SURE, Baseline, Mismatch
 from .evidence import Evidence
+from .findings import Solution
 from .locate import locate
-from .naming import LEAST_SHARE, Named
+from .naming import LEAST_SHARE
 from .predictions import PREDICTED, with_predictions
-from .problem import Problem
 from .regression import Fit, fit
-from .telling import rough, shown_places
+from .structure import significant
+from .verdict import rough
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,42 +31,43 @@ class Earlier:
     recording: Recording
 
 
-def obeyed(recording: Recording, problem: Problem, found: Named, seed: int = 0) -> Baseline:
+def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
     """The baseline that a recording obeys, as explaining it found it.
 
     Without what belongs to a moment of it, which says nothing about another, and without what acts
     on the force that the rest predicts, which no baseline can hold.
     """
-    evidence = with_predictions(problem.evidence, found.last)
-    kept = verification.lasting(found.last)
-    plain = [i for i, t in enumerate(kept.terms) if not t.coordinates & PREDICTED]
-    kept, now = kept.only(plain), found.last
-    if len(kept.terms) < len(now.terms):
-        now = fit(kept.terms, evidence, kept.betas)
+    problem, current = solution.problem, solution.selection.last
+    evidence = with_predictions(problem.evidence, current)
+    lasting = verification.lasting(current)
+    plain = [i for i, t in enumerate(lasting.terms) if not t.coordinates & PREDICTED]
+    lasting = lasting.only(plain)
+    if len(lasting.terms) < len(current.terms):
+        current = fit(lasting.terms, evidence, lasting.betas)
     force = float(np.sqrt(np.mean(evidence.force**2)))
-    seen = with_predictions(problem.evidence, now)
-    places = shown_places(locate(seen, now, seed), LEAST_SHARE, force)
-    own = verification.error(now, problem.evidence)
+    seen = with_predictions(problem.evidence, current)
+    found = significant(locate(seen, current, seed), LEAST_SHARE, force)
+    own = verification.error(current, problem.evidence)
     errors = {
         "force_error": {"before": own, "after": own},
         "holdout_force_error": None,
-        "noise_floor": verification.noise(now, evidence.force),
+        "noise_floor": verification.noise(current, evidence.force),
     }
-    named = spelled.estimates(now, problem.block, recording.unit_names)
+    named = spelled.estimates(current, problem.block, recording.unit_names)
     columns = [
         [known[p.name].standard_error for p in (*term.affine, *term.nonlinear)]
-        for term, known in zip(now.terms, named, strict=True)
+        for term, known in zip(current.terms, named, strict=True)
     ]
-    counts = [len(term.affine) for term in now.terms]
+    counts = [len(term.affine) for term in current.terms]
     affine = [e for own, count in zip(columns, counts, strict=True) for e in own[:count]]
     searched = [e for own, count in zip(columns, counts, strict=True) for e in own[count:]]
     return Baseline(
-        spelled.whole(now),
+        spelled.whole(current),
         f"recording {PurePath(recording.source).name}".rstrip(),
-        spelled.model(now, recording.units),
+        spelled.model(current, recording.units),
         np.asarray([*affine, *searched], float),
-        now,
-        frozenset(place.coordinate for place in places),
+        current,
+        frozenset(each.coordinate for each in found),
         rough(errors, {}),
     )
 
@@ -75,24 +77,24 @@ def rephased(known: Baseline, evidence: Evidence) -> Baseline:
 
     The zero of an incremental encoder is another after each homing.
     """
-    now: Fit = known.fit
-    waves = frozenset(i for i in range(1, len(now.terms)) if verification.wavelike(now, i))
+    current: Fit = known.fit
+    waves = frozenset(i for i in range(1, len(current.terms)) if verification.wavelike(current, i))
     if not waves:
         return known
-    there = verification.at_phase(now, evidence, waves)
+    there = verification.at_phase(current, evidence, waves)
     return known._replace(model=spelled.model(there, known.model.units), fit=there)
 
 
-def changed(wrong: Mismatch | None, known: Baseline, now: Fit, errors) -> Mismatch | None:
+def changed(wrong: Mismatch | None, known: Baseline, current: Fit, errors) -> Mismatch | None:
     """The values that hold here no more; `None` where all lie within what both recordings leave
     open. Values that do move with the others.
 
-    **Arguments:** `now`, the baseline refitted here, `errors`, the standard errors of its
+    **Arguments:** `current`, the baseline refitted here, `errors`, the standard errors of its
     parameters, affine ones first.
     """
     if wrong is None or known.errors is None:
         return wrong
-    values = [*now.alphas[0], *now.betas[0]]
+    values = [*current.alphas[0], *current.betas[0]]
     within = frozenset(
         i
         for i, before in wrong.moved.items()

@@ -9,46 +9,46 @@ from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
 from .baseline import SURE, at_values
-from .chance import blocks
 from .evidence import gather, motion_of
 from .figures import Figures, cast
-from .improvement import Improved, Rest, with_late
-from .naming import Named
+from .findings import Findings, Solution
+from .improvement import Improved
 from .predictions import with_predictions
-from .problem import Problem
 from .regression import Fit, fit
+from .significance import blocks
 
 
-def filtered_errors(problem: Problem, first: Fit, where: Problem, left: Named) -> dict[str, Any]:
+def filtered_errors(findings: Findings, first: Fit) -> dict[str, Any]:
     """The force errors through the kernel of the rows."""
+    recorded, (problem, selection) = findings.problem, findings.undelayed
 
     def pair(before, after, rephased=frozenset()):
         return {
             "before": verification.error(first, before),
-            "after": verification.error(left.last, after, rephased),
+            "after": verification.error(selection.last, after, rephased),
         }
 
+    held = recorded.held and pair(recorded.held, problem.held, selection.rephased)
     return {
-        "force_error": pair(problem.evidence, where.evidence),
-        "holdout_force_error": problem.held and pair(problem.held, where.held, left.rephased),
-        "noise_floor": verification.noise(left.last, where.evidence.force),
+        "force_error": pair(recorded.evidence, problem.evidence),
+        "holdout_force_error": held,
+        "noise_floor": verification.noise(selection.last, problem.evidence.force),
     }
 
 
-def document(
-    problem: Problem, better: Improved, filtered: dict, model: Model, figures: Figures
-) -> dict:
+def document(better: Improved, filtered: dict, model: Model, figures: Figures) -> dict:
     """The document's errors: those of `predict` and a subtraction, and those through the kernel."""
 
     def pair(before, after):
         return None if before is None else {"before": before, "after": after}
 
-    before, after, reach = better.before, better.after, problem.evidence.reach
-    refitted = _refitted(problem, better, figures)
+    before, after, problem = better.before, better.after, better.findings.problem
+    reach = problem.evidence.reach
+    refitted = _refitted(better.findings, figures)
     return {
         "force_error": pair(before.here, after.here),
         "holdout_force_error": pair(before.held, after.held),
-        "holdout_adjusted": _adjusted(better) if problem.held else None,
+        "holdout_adjusted": _adjusted(better.findings) if problem.held else None,
         "holdout_refitted_error": refitted["error"],
         "holdout_values": refitted.get("values"),
         "simulation_error": None,
@@ -61,33 +61,30 @@ def document(
     }
 
 
-def _refitted(problem: Problem, better: Improved, figures: Figures) -> dict[str, Any]:
+def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     """What the model leaves of the held-out recording with values of its own, and which these are.
 
-    Named are values of the baseline's terms that differ by more than both recordings leave open.
+    Listed are values of the baseline's terms that differ by more than both recordings leave open.
     """
+    problem, selection = findings.undelayed
     if problem.held is None:
         return dict.fromkeys(("error", "filtered"))
-    left, units = better.rest[1], problem.evidence.motion.units
-    held = better.rest[0].held
-    carried = verification.carried(left.last, held, left.rephased)
-    again = fit(carried.terms, with_predictions(held, carried), carried.betas)
-    late = len(better.found.last.terms) - len(left.last.terms)
-    whole = with_late(again, better.found.last, late) if late else again
+    carried = verification.carried(selection.last, problem.held, selection.rephased)
+    again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
+    model = spelled.model(findings.with_late(again), problem.evidence.motion.units)
     return {
-        "error": figures.held(spelled.model(whole, units)),
-        "filtered": verification.error(again, held),
-        "values": {} if better.found.given else _differing(better.rest, again),
+        "error": figures.held(model),
+        "filtered": verification.error(again, problem.held),
+        "values": {} if findings.selection.given else _differing(findings.undelayed, again),
     }
 
 
-def _differing(rest: Rest, again: Fit) -> dict[str, dict[str, Any]]:
+def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:
     """Values of the first term that are others on the held-out recording, here and there."""
-    where, left = rest
-    units = where.evidence.motion.unit_names
-    here = spelled.estimates(left.last, where.block, units)[0]
-    elapsed = where.held.elapsed[where.held.centre]
-    there = spelled.estimates(again, blocks(elapsed, where.held.reach), units)[0]
+    problem, held = solution.problem, solution.problem.held
+    units = problem.evidence.motion.unit_names
+    here = spelled.estimates(solution.selection.last, problem.block, units)[0]
+    there = spelled.estimates(again, blocks(held.elapsed[held.centre], held.reach), units)[0]
     return {
         name: {
             "here": float(own.value),
@@ -101,20 +98,20 @@ def _differing(rest: Rest, again: Fit) -> dict[str, dict[str, Any]]:
     }
 
 
-def _adjusted(better: Improved) -> dict[str, list[str]]:
+def _adjusted(findings: Findings) -> dict[str, list[str]]:
     """Findings that the held-out figures take at another phase, or leave out."""
-    where, left = better.rest
-    there = verification.carried(left.last, where.held, left.rephased)
-    start = len(left.last.terms) - len(left.taken)
-    said: dict[str, list[str]] = {"left_out": [], "rephased": []}
-    kept = {id(term): alpha for term, alpha in zip(there.terms, there.alphas, strict=True)}
-    for number, taken in enumerate(left.taken):
-        term, alpha = left.last.terms[start + number], left.last.alphas[start + number]
-        if id(term) not in kept:
-            said["left_out"].append(taken.trial.candidate.effect.name)
-        elif not np.array_equal(kept[id(term)], alpha):
-            said["rephased"].append(taken.trial.candidate.effect.name)
-    return said
+    problem, selection = findings.undelayed
+    there = verification.carried(selection.last, problem.held, selection.rephased)
+    adjusted: dict[str, list[str]] = {"left_out": [], "rephased": []}
+    known = {id(term): alpha for term, alpha in zip(there.terms, there.alphas, strict=True)}
+    for number, taken in enumerate(selection.taken):
+        index = selection.term_index(number)
+        term, alpha = selection.last.terms[index], selection.last.alphas[index]
+        if id(term) not in known:
+            adjusted["left_out"].append(taken.trial.candidate.effect.name)
+        elif not np.array_equal(known[id(term)], alpha):
+            adjusted["rephased"].append(taken.trial.candidate.effect.name)
+    return adjusted
 
 
 def through_kernel(model: Model, recording: Recording, delay: float = 0.0) -> float:

@@ -24,7 +24,7 @@ _EVEN = np.linspace(0.0, 1.0, KNOTS)
 _EARLY = np.concatenate([[0.0], 2.0 ** np.linspace(-8.0, 0.0, KNOTS - 1)])
 
 
-class Place(NamedTuple):
+class Structure(NamedTuple):
     """What the residual shows against one coordinate.
 
     - `share`: part of the residual's mean square that the curve removes beyond what chance gives.
@@ -41,10 +41,10 @@ class Place(NamedTuple):
     curve: tuple[np.ndarray, np.ndarray]
 
 
-def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
+def locate(evidence: Evidence, current: Fit, seed: int = 0) -> list[Structure]:
     """Every coordinate, the largest share first; `evidence` with the fit's predictions."""
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    bootstrap = BlockBootstrap(now, block, seed)
+    bootstrap = BlockBootstrap(current, block, seed)
 
     def over(coordinate) -> _Scanned:
         name, (value, factor, kind) = coordinate
@@ -57,13 +57,13 @@ def locate(evidence: Evidence, now: Fit, seed: int = 0) -> list[Place]:
         scan = bootstrap(scaled(SpectralLines(name, False).columns(evidence, grid)))
         return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
 
-    there = {"position": evidence.motion.position is not None, "time": evidence.clock}
-    lines = each(along, [name for name, known in there.items() if known])
+    available = {"position": evidence.motion.position is not None, "time": evidence.clock}
+    lines = each(along, [name for name, known in available.items() if known])
     seen = [*each(over, coordinates(evidence).items()), *lines]
     gains = np.array([s.scan.gain.max() for s in seen])
     p_values = adjusted(gains, np.array([s.scan.drawn for s in seen]))
-    found = [_place(s, float(p), now) for s, p in zip(seen, p_values, strict=True)]
-    return sorted(found, key=lambda place: -place.share)
+    found = [_structure(s, float(p), current) for s, p in zip(seen, p_values, strict=True)]
+    return sorted(found, key=lambda each: -each.share)
 
 
 class _Scanned(NamedTuple):
@@ -76,39 +76,39 @@ class _Scanned(NamedTuple):
     peak: float = float("nan")
 
 
-def _place(seen: _Scanned, p_value: float, now: Fit) -> Place:
+def _structure(seen: _Scanned, p_value: float, current: Fit) -> Structure:
     scan, knots = seen.scan, seen.knots
     share = max(float(scan.gain[scan.best] - scan.drawn.mean()), 0.0)
-    size = float(np.sqrt(share * now.energy / len(now.residual)))
+    size = float(np.sqrt(share * current.energy / len(current.residual)))
     curve = (knots, np.zeros_like(knots))
     if seen.raw is not None and len(knots):
-        basis = now.basis()
+        basis = current.basis()
         own = seen.raw - basis @ (basis.T @ seen.raw)
-        curve = (knots, np.linalg.lstsq(own, now.residual, rcond=1e-3)[0])
-    return Place(seen.name, share, size, p_value, seen.peak, curve)
+        curve = (knots, np.linalg.lstsq(own, current.residual, rcond=1e-3)[0])
+    return Structure(seen.name, share, size, p_value, seen.peak, curve)
 
 
-def repeated(places: list[Place], now: Fit, held: Evidence) -> list[Place]:
-    """The places whose curve takes something off what a fit leaves of another recording.
+def repeated(found: list[Structure], current: Fit, held: Evidence) -> list[Structure]:
+    """The structure whose curve lowers the residual of a fit on another recording.
 
-    The fit's parameters may move there; `held` with the fit's predictions. Not asked, and so kept,
-    are the coordinates of time, lines, whose phase may be another, and what the other recording
-    did not record.
+    The fit's parameters may move there; `held` with the fit's predictions. Coordinates of time,
+    lines, whose phase may be another, and signals that the other recording lacks are not tested,
+    and stay.
     """
-    there, known = fit(now.terms, held, now.betas, 0), coordinates(held)
+    there, known = fit(current.terms, held, current.betas, 0), coordinates(held)
     basis = there.basis()
-    left = there.residual - basis @ (basis.T @ there.residual)
+    residual = there.residual - basis @ (basis.T @ there.residual)
 
-    def again(place: Place) -> bool:
+    def again(each: Structure) -> bool:
         # A spectral line is no coordinate of a curve.
-        if place.coordinate.startswith("time") or place.coordinate not in known:
+        if each.coordinate.startswith("time") or each.coordinate not in known:
             return True
-        knots, heights = place.curve
-        curve = _hats(held, *known[place.coordinate], knots) @ heights
+        knots, heights = each.curve
+        curve = _hats(held, *known[each.coordinate], knots) @ heights
         curve = curve - basis @ (basis.T @ curve)
-        return bool(np.sum((left - curve) ** 2) < np.sum(left**2))
+        return bool(np.sum((residual - curve) ** 2) < np.sum(residual**2))
 
-    return [place for place in places if again(place)]
+    return [each for each in found if again(each)]
 
 
 def coordinates(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:
@@ -166,25 +166,25 @@ NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direct
 
 
 def _knots(name: str, values: np.ndarray) -> np.ndarray:
-    places = np.quantile(values, _EARLY if "since" in name else _EVEN)
+    knots = np.quantile(values, _EARLY if "since" in name else _EVEN)
     if name in NOISY:
         low, high = np.quantile(values, [0.01, 0.99])
-        places = np.linspace(low, high, KNOTS)
-    width = places[-1] - places[0]
+        knots = np.linspace(low, high, KNOTS)
+    width = knots[-1] - knots[0]
     # Strictly increasing, by a millionth of the range, where many samples share one value.
-    return places + 1e-6 * (width if width > 0 else 1.0) * np.arange(len(places))
+    return knots + 1e-6 * (width if width > 0 else 1.0) * np.arange(len(knots))
 
 
 def _hats(evidence, value, factor, kind, knots) -> np.ndarray:
     """The curve's hats as rows, `(J, K)`."""
     if kind == "rate":
         return evidence.project(np.zeros((1, len(value))), value[None, :]).T
-    place = np.interp(value, knots, np.arange(len(knots)))
-    hats = np.maximum(1 - np.abs(place[:, None] - np.arange(len(knots))[None, :]), 0.0)
+    at = np.interp(value, knots, np.arange(len(knots)))
+    hats = np.maximum(1 - np.abs(at[:, None] - np.arange(len(knots))[None, :]), 0.0)
     if kind == "plain":
         return evidence.project((factor[:, None] * hats).T).T
     # Lagrange: d(M₁ v)/dt − ½ M₁′ v².
-    cell = np.clip(np.floor(place).astype(int), 0, len(knots) - 2)
+    cell = np.clip(np.floor(at).astype(int), 0, len(knots) - 2)
     inside = (value > knots[0]) & (value < knots[-1])
     rate = np.where(inside, 1 / np.diff(knots)[cell], 0.0)
     slopes = np.zeros_like(hats)

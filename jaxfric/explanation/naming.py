@@ -74,11 +74,15 @@ class Named(NamedTuple):
         """The effects that were found."""
         return frozenset(taken.trial.candidate.effect.name for taken in self.taken)
 
+    def term_index(self, number: int) -> int:
+        """The index, among all terms of the fit, of the selected term of that number."""
+        return len(self.last.terms) - len(self.taken) + number
+
     @property
     def rephased(self) -> frozenset[int]:
-        """Numbers of the terms that need another phase on the held-out recording."""
-        start = len(self.last.terms) - len(self.taken)
-        return frozenset(start + i for i, taken in enumerate(self.taken) if taken.rephased)
+        """Indices of the terms that need another phase on the held-out recording."""
+        taken = enumerate(self.taken)
+        return frozenset(self.term_index(number) for number, each in taken if each.rephased)
 
 
 def search(

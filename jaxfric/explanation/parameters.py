@@ -54,10 +54,10 @@ def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[s
     return result
 
 
-def seen_by(view: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
-    """The parameters of a model refitted to another view of the machine, in `count` blocks."""
-    again = fit(known.terms, with_predictions(view, known), known.betas, 4)
-    return estimates(again, np.arange(len(view.rows)) * count // len(view.rows), units)
+def refitted_to(evidence: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
+    """The parameters of a model refitted to other rows of the machine, in `count` blocks."""
+    again = fit(known.terms, with_predictions(evidence, known), known.betas, 4)
+    return estimates(again, np.arange(len(evidence.rows)) * count // len(evidence.rows), units)
 
 
 def may_be_none(term: AbstractTerm, known: dict[str, Estimate]) -> bool:

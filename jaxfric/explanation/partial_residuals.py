@@ -18,46 +18,43 @@ from .improvement import Improved
 from .intervals import covariance
 from .locate import coordinates
 from .predictions import with_predictions
-from .problem import Problem
 from .regression import Fit
 
 # Half a 95 % interval in standard errors, as in the findings' sentences.
 HALF_WIDTH = 2.0
 
 
-def partial_residuals(problem: Problem, better: Improved) -> list[dict[str, Any]]:
+def partial_residuals(better: Improved) -> list[dict[str, Any]]:
     """The picture of each finding, in the order of discovery, as plain lists.
 
     Each holds `coordinate`, `unit`, `at`, and at these places `measured` with its standard error
     `error`, `law` between `low` and `high`, and the mean residual `before` and `after`.
     """
     pictures = []
-    for number, taken in enumerate(better.found.taken):
-        late = number >= len(better.rest[1].taken)
-        where, named = (problem, better.found) if late else better.rest
-        now = named.last
-        place = len(now.terms) - len(named.taken) + number
-        seen = with_predictions(where.evidence, now)
-        law = now.part(place)
-        slopes, spread = _parameters(now, place, where.block)
-        along = _along(taken.trial.candidate.effect.name, now, place, seen)
-        before = verification.residual(better.first, where.evidence)
+    for number, taken in enumerate(better.findings.selection.taken):
+        problem, selection = better.findings.examined_in(number)
+        current, index = selection.last, selection.term_index(number)
+        seen = with_predictions(problem.evidence, current)
+        law = current.part(index)
+        slopes, spread = _parameters(current, index, problem.block)
+        along = _along(taken.trial.candidate.effect.name, current, index, seen)
+        before = verification.residual(better.first, problem.evidence)
         pictures.append(
-            _picture(along, law, now.residual, before) | _band(along, law, slopes, spread)
+            _picture(along, law, current.residual, before) | _band(along, law, slopes, spread)
         )
     return pictures
 
 
-def moved(problem: Problem, better: Improved, wrong: Mismatch) -> dict[str, Any]:
+def moved(better: Improved, wrong: Mismatch) -> dict[str, Any]:
     """The picture of wrong values: by how much the baseline's force changes with the right ones."""
-    where, named = better.rest
+    problem, selection = better.findings.undelayed
     names = [p.name for p in (*better.first.terms[0].affine, *better.first.terms[0].nonlinear)]
     inertial = any(names[i].startswith("inertia") for i in wrong.moved)
-    seen = with_predictions(where.evidence, named.last)
+    seen = with_predictions(problem.evidence, selection.last)
     along = axis("acceleration" if inertial else "velocity", seen, seen.motion.unit_names)
-    before = verification.residual(better.first, where.evidence)
-    law = named.last.part(0) - (where.evidence.target - before)
-    return _picture(along, law, named.last.residual, before)
+    before = verification.residual(better.first, problem.evidence)
+    law = selection.last.part(0) - (problem.evidence.target - before)
+    return _picture(along, law, selection.last.residual, before)
 
 
 def _picture(along: Axis, law, residual, before) -> dict[str, Any]:
@@ -86,19 +83,19 @@ def _band(along: Axis, law, slopes: np.ndarray, spread: np.ndarray) -> dict[str,
     return {"low": (middle - half).tolist(), "high": (middle + half).tolist()}
 
 
-def _parameters(now: Fit, place: int, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _parameters(current: Fit, index: int, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The derivatives of the force by one term's parameters, `(J, k)`, and their covariance."""
-    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
-    own = [*range(affine[place], affine[place + 1]), *range(searched[place], searched[place + 1])]
-    return now.jacobian[:, own], covariance(now, block)[np.ix_(own, own)]
+    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
+    own = [*range(affine[index], affine[index + 1]), *range(searched[index], searched[index + 1])]
+    return current.jacobian[:, own], covariance(current, block)[np.ix_(own, own)]
 
 
-def _along(effect: str, now: Fit, place: int, seen: Evidence) -> Axis:
+def _along(effect: str, current: Fit, index: int, seen: Evidence) -> Axis:
     """The coordinate over which an effect shows, a wave's folded at its period."""
     units: Mapping[str, str] = seen.motion.unit_names
     known = coordinates(seen)
-    term, beta = now.terms[place], now.betas[place]
+    term, beta = current.terms[index], current.betas[index]
     wanted = EFFECTS[effect].coordinates
     name = next((n for n in wanted if n.removesuffix("_lines") in known), "velocity")
     period = _period(term, beta)

@@ -89,7 +89,7 @@ def nil(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iter
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     values = spelled.estimates(now, block, units)
     if wide is not None:
-        there = spelled.seen_by(wide, now, int(block[-1]) + 1, units)
+        there = spelled.refitted_to(wide, now, int(block[-1]) + 1, units)
         values = [spelled.with_smoothing(*pair) for pair in zip(values, there, strict=True)]
     for number in reversed(range(count)):
         if spelled.may_be_none(now.terms[start + number], values[start + number]):

@@ -18,6 +18,7 @@ from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
 from .contest import RIVAL, Trial
 from .evidence import Motion, gather, motion_of
+from .findings import Findings, Solution
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .problem import Problem
@@ -32,16 +33,16 @@ STRIDE, STRIDES = 1.3, 12
 PARABOLAS, CLOSE = 4, 3e-3
 
 
-class Late(NamedTuple):
+class LateForce(NamedTuple):
     """A force that acts late: its time, s, and how to undo it.
 
-    `taken`: what was found, under its right name; `smoothed`: what the kernel's smoothing and the
-    sampling make of the time, s.
+    `selected`: the term, under its right name; `smoothed`: the error of the time by smoothing and
+    sampling, s.
     """
 
     time: float
     undo: Undo
-    taken: Taken
+    selected: Taken
     smoothed: float
 
     def undone(self, recording: Recording | Motion) -> Motion:
@@ -49,18 +50,16 @@ class Late(NamedTuple):
         return _undone(motion_of(recording), self.undo, self.time)
 
 
-def late(recording: Motion, problem: Problem, found: Named) -> Late | None:
+def late(recording: Motion, problem: Problem, found: Named) -> LateForce | None:
     """The delay or lag among the findings under its right name, where there is one."""
-    start = len(found.last.terms) - len(found.taken)
-    places = [i for i, term in enumerate(found.last.terms) if traits(term).late]
-    if len(places) != 1 or places[0] < start:
+    index = [i for i, term in enumerate(found.last.terms) if traits(term).late]
+    if len(index) != 1 or index[0] < found.term_index(0):
         return None
-    place = places[0]
-    guess = float(found.last.alphas[place][0])
+    guess = float(found.last.alphas[index[0]][0])
     if guess <= 0:
         return None
     undoing = _Undoing(recording, problem, found.last)
-    return _told_apart(undoing, guess, found.taken[place - start], found.left.size)
+    return _told_apart(undoing, guess, found.taken[index[0] - found.term_index(0)], found.left.size)
 
 
 # Undoing a delay or lag that is there takes most of what is left; what merely resembles one, as the
@@ -68,7 +67,9 @@ def late(recording: Motion, problem: Problem, found: Named) -> Late | None:
 MOST_LATE = 0.5
 
 
-def overlooked(recording: Motion, problem: Problem, found: Named, seed: int = 0) -> Late | None:
+def overlooked(
+    recording: Motion, problem: Problem, found: Named, seed: int = 0
+) -> LateForce | None:
     """A delay or lag beside the findings that is too long for its first order to show.
 
     Times are doubled from one sampling period on until undoing them does more harm than good, which
@@ -178,7 +179,7 @@ def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
     return float(middle - 0.5 * spread * slope / square) if square > 0 else float("nan")
 
 
-def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> Late:
+def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> LateForce:
     """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
     problem = undoing.problem
     least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
@@ -194,7 +195,7 @@ def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> L
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
     smoothed = float(np.hypot((wide - time) / 3, problem.evidence.limits.interval / np.sqrt(12)))
     trial = taken.trial._replace(candidate=_candidate(best))
-    return Late(time, best.undone, taken._replace(trial=trial, rivals=rivals), smoothed)
+    return LateForce(time, best.undone, taken._replace(trial=trial, rivals=rivals), smoothed)
 
 
 def ways() -> list[Effect]:
@@ -206,44 +207,49 @@ def _candidate(effect: Effect) -> Candidate:
     return Candidate(effect, effect.laws[0](), np.zeros((1, 0)))
 
 
-def settled(
-    found: Named, behind: Named, lateness: Late, problem: Problem, there: Problem
-) -> tuple[Named, Named]:
-    """What was found once the force was put back, `behind`, and the delay or lag itself.
+def with_late_force(found: Solution, undelayed: Solution, late: LateForce) -> Findings:
+    """The findings: what was selected once the force was put back, and the delay or lag itself.
 
-    Beside it the same without, on the recording with the force put back, `there`: what that leaves
-    is what the findings leave, while a column for the delay keeps its second order.
+    What the findings leave is what the problem `undelayed` leaves, as a column for the delay keeps
+    its second order.
     """
-    others = [t for t in behind.taken if not t.trial.candidate.effect.late]
-    kept = [i for i, term in enumerate(behind.last.terms) if not traits(term).late]
-    seen = with_predictions(there.evidence, behind.last)
-    left = fit([behind.last.terms[i] for i in kept], seen, [behind.last.betas[i] for i in kept], 6)
-    known = lateness.taken.trial.candidate
-    for number in reversed(range(len(others))):
-        place = len(left.terms) - len(others) + number
-        less = without(left, seen, place)
-        # As for any later term, but that an undone delay leaves nothing of its own.
-        before = [known.effect, *(t.trial.candidate.effect for t in others[:number])]
-        effect = others[number].trial.candidate.effect
-        least = least_gain(effect, before, found.base.energy, less.energy, 0.0)
-        if less.energy - left.energy < least:
-            left, others = less, [t for i, t in enumerate(others) if i != number]
-    evidence = with_predictions(problem.evidence, left)
-    now = fit((*left.terms, known.term), evidence, [*left.betas, np.zeros(0)], 6)
+    undelayed = _worth_it(undelayed, late, found.selection.base)
+    others, known = undelayed.selection, late.selected.trial.candidate
+    evidence = with_predictions(found.problem.evidence, others.last)
+    none = np.zeros(0)
+    current = fit((*others.last.terms, known.term), evidence, [*others.last.betas, none], 6)
     # To first order the rest is only nearly itself.
-    now = now._replace(
-        alphas=(*left.alphas, np.array([lateness.time])), betas=(*left.betas, np.zeros(0))
+    current = current._replace(
+        alphas=(*others.last.alphas, np.array([late.time])), betas=(*others.last.betas, none)
     )
-    rest = behind._replace(last=left, taken=others)
-    taken = [*others, lateness.taken]
-    found = found._replace(
-        last=now,
-        taken=taken,
-        left=behind.left,
-        smoothed=lateness.smoothed,
-        undone=lateness.undone,
+    selection = found.selection._replace(
+        last=current,
+        taken=[*others.taken, late.selected],
+        left=others.left,
+        smoothed=late.smoothed,
+        undone=late.undone,
     )
-    return found, rest
+    return Findings(Solution(found.problem, selection), undelayed)
+
+
+def _worth_it(undelayed: Solution, late: LateForce, base: Fit) -> Solution:
+    """The terms selected beside an undone delay or lag, without another such, that remove enough.
+
+    As for any later term, but that an undone delay leaves nothing of its own.
+    """
+    problem, selection = undelayed
+    others = [t for t in selection.taken if not t.trial.candidate.effect.late]
+    index = [i for i, term in enumerate(selection.last.terms) if not traits(term).late]
+    seen = with_predictions(problem.evidence, selection.last)
+    terms, betas = ([values[i] for i in index] for values in selection.last[:2])
+    current = fit(terms, seen, betas, 6)
+    for number in reversed(range(len(others))):
+        less = without(current, seen, len(current.terms) - len(others) + number)
+        effects = [t.trial.candidate.effect for t in (late.selected, *others[: number + 1])]
+        least = least_gain(effects[-1], effects[:-1], base.energy, less.energy, 0.0)
+        if less.energy - current.energy < least:
+            current, others = less, [t for i, t in enumerate(others) if i != number]
+    return Solution(problem, selection._replace(last=current, taken=others))
 
 
 def _undone(motion: Motion, undo: Undo, time: float) -> Motion:

@@ -108,7 +108,7 @@ def _ways(now: Fit, evidence: Evidence, rephased: frozenset[int]):
 
 def lacking(named: Named, evidence: Evidence, number: int) -> Fit:
     """The model refitted without the found term of that number; the base where it is not kept."""
-    less = without(named.last, evidence, len(named.last.terms) - len(named.taken) + number)
+    less = without(named.last, evidence, named.term_index(number))
     return less if named.given is None else as_given(named.given, less, evidence, named.free)
 
 

@@ -1,0 +1,172 @@
+"""What an explanation is given: recordings and baseline, checked, and without faults of sensors."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from .. import checks
+from ..checks import Remark
+from ..data.recording import Recording, check_same_units, require, require_force
+from ..identification.identified import Identified
+from ..models import NAMED, Model
+from ..simulation.prediction import outliers, unseen
+from ..simulators import AbstractSimulator, Attribute, Known, same_motion
+from ..terms import KNOWN, KNOWN_FORCE
+from ..terms.base import AbstractTerm
+from . import sanity
+from .baseline import baseline_of
+from .earlier import Earlier
+from .figures import Figures, cast
+from .sanity import Looked
+
+
+class Inputs(NamedTuple):
+    """Recordings and baseline as the search takes them.
+
+    - `recording`, `holdout`: with another simulator's force where the baseline stands on one.
+    - `sound`, `sound_holdout`: the same without samples that no actuator made.
+    - `baseline`: a name, a sum of terms, a model, or a recording; `fixed`: its values stay.
+    - `figures`: force errors in the caller's precision; `remarks`: about the recordings.
+    - `looked`: what was looked at before any physics where the baseline is a simulator, whose
+      `attributes` are those values that may be wrong.
+    """
+
+    recording: Recording
+    holdout: Recording | None
+    sound: Recording
+    sound_holdout: Recording | None
+    baseline: Any
+    fixed: bool
+    figures: Figures
+    remarks: list[Remark]
+    looked: Looked | None
+    attributes: Mapping[str, Attribute]
+
+    def in_double_precision(self) -> tuple[Recording, Recording | None, Any]:
+        """Recording, held-out recording and baseline as the search takes them."""
+        return cast(self.sound), cast(self.sound_holdout), cast(self.baseline)
+
+
+def prepare(
+    recording: Recording, baseline, holdout: Recording | None, fixed: bool,
+    doing: Callable[[str], None],
+) -> Inputs:  # fmt: skip
+    """The arguments of [`explain`][] checked, and recordings inspected.
+
+    **Raises:** `ValueError` for what cannot be explained.
+    """
+    _check(recording, baseline, holdout)
+    baseline, looked = _simulator(recording, baseline, holdout), None
+    if isinstance(baseline, AbstractSimulator):
+        doing("looking at signs, zeros, clocks and limits")
+        baseline = looked = sanity.looked_at(recording, baseline, holdout)
+        recording, holdout = looked.logs(recording, holdout)
+    attributes = baseline.attributes() if isinstance(baseline, AbstractSimulator) else {}
+    recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
+    if isinstance(baseline, Earlier):
+        baseline = baseline.recording
+    if not isinstance(baseline, Recording):
+        baseline_of(baseline)
+    figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
+    sound, remarks = inspected(recording)
+    sound_holdout, more = (None, []) if holdout is None else inspected(holdout)
+    more = [each._replace(text=f"On the held-out recording: {each.text}") for each in more]
+    remarks = [*remarks, *more]
+    remarks = remarks if looked is None else looked.remarks(remarks)
+    return Inputs(
+        recording, holdout, sound, sound_holdout, baseline, fixed, figures, remarks, looked,
+        attributes,
+    )  # fmt: skip
+
+
+def _check(recording: Recording, baseline, holdout: Recording | None) -> None:
+    require(recording, "explain")
+    require_force(recording, "explain")
+    if holdout is not None:
+        require(holdout, "explain (holdout)")
+        require_force(holdout, "explain (holdout)")
+    other = baseline.recording if isinstance(baseline, Earlier) else baseline
+    if isinstance(other, Recording):
+        require(other, "explain (baseline)")
+    for each in (holdout, other):
+        if isinstance(each, Recording):
+            check_same_units(recording, each)
+
+
+def _simulator(recording: Recording, baseline, holdout: Recording | None):
+    """The baseline, as a simulator where it gives another program's force along this motion."""
+    if isinstance(baseline, Recording) and holdout is None and same_motion(recording, baseline):
+        return Known(baseline.force)
+    if any(
+        baseline is make for make in NAMED.values()
+    ):  # the function that makes a model, not called
+        return baseline()
+    given_as = type | Model | Identified | AbstractTerm | AbstractSimulator
+    return (
+        Known(baseline) if callable(baseline) and not isinstance(baseline, given_as) else baseline
+    )
+
+
+def as_seen(model: Model, recording: Recording) -> Model:
+    """The model without values of a direction in which the recording does not move."""
+    lacking = unseen(model.parameters, recording)
+    return model.with_parameters(dict.fromkeys(lacking, np.nan)) if lacking else model
+
+
+def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bool):
+    """The recordings with another simulator's force where the baseline stands on one, and the
+    baseline as a model of corrections to it, which stay zero unless they are found wrong.
+    """
+    if isinstance(baseline, AbstractSimulator):
+        held = None if holdout is None else baseline.beside(holdout, held_out=True)
+        recording = baseline.beside(recording)
+        return recording, baseline.baseline(recording.units), held, True
+    given = baseline.model if isinstance(baseline, Identified) else baseline
+    term = given.term if isinstance(given, Model) else given
+    if isinstance(term, AbstractTerm) and KNOWN_FORCE in term.coordinates:
+        return recording, baseline, holdout, fixed
+    held = None if holdout is None else _alone(holdout)
+    return _alone(recording), baseline, held, fixed
+
+
+def _alone(recording: Recording) -> Recording:
+    """The recording without another simulator's force, which this baseline does not stand on."""
+    channels = {k: v for k, v in recording.channels.items() if not k.startswith(KNOWN)}
+    return dataclasses.replace(recording, channels=channels)
+
+
+# What is said of lone samples in other words, as they are left out here.
+SPIKES = "force_spikes"
+
+
+def inspected(recording: Recording) -> tuple[Recording, list[Remark]]:
+    """A recording without samples that no actuator made, and what is to be said of it.
+
+    Every check of a recording by itself belongs here: where a remark is severe, nothing is named.
+    """
+    remarks = [remark for remark in checks.inspect(recording) if remark.name != SPIKES]
+    spikes = outliers(recording)
+    if not spikes.any():
+        return recording, remarks
+    mask = jnp.asarray(np.asarray(recording.mask) & ~spikes)
+    return dataclasses.replace(recording, mask=mask), [*remarks, _spikes(recording, spikes)]
+
+
+def _spikes(recording: Recording, lone: np.ndarray) -> Remark:
+    force = np.asarray(recording.force, float)
+    known = np.asarray(recording.mask) & np.isfinite(force)
+    share = float(np.sum(force[lone] ** 2) / np.sum(force[known] ** 2))
+    count, at = int(lone.sum()), float(np.asarray(recording.time)[np.argmax(lone)])
+    unit = recording.unit_names["force"]
+    which = f"one sample of the force, {force[np.argmax(lone)]:.3g} {unit} at t = {at:.6g} s, holds"
+    if count > 1:
+        which = f"{count} lone samples of the force, the first at t = {at:.6g} s, hold"
+    return Remark(
+        SPIKES,
+        f"{recording.source or 'The recording'}: {which} {share:.0%} of its power, which no "
+        "actuator does: left out. Look for a fault of the sensor, the bus or the file.",
+        False,
+    )

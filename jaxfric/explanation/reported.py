@@ -1,0 +1,144 @@
+"""Findings as they are reported: parameters with their errors, shares, sentences."""
+
+import numpy as np
+
+from ..identification.uncertainty import Estimate
+from ..terms.effect import Extent
+from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
+from . import verification
+from .baseline import Baseline, Mismatch
+from .evidence import Evidence
+from .explained import Finding, Moved
+from .findings import Findings
+from .improvement import Improved
+from .regression import Fit
+from .sentences import changed_sentence, mismatch_sentence, sentence
+from .uncertainty import estimated
+
+# What cannot be told from a force that acts late.
+NO_POSITION = (
+    "No position is recorded: a filter on the recorded velocity looks like a delay or a lag, and "
+    "recording the position tells."
+)
+REPHASED = (
+    " On the held-out recording it has the same period and amplitude at another phase: the "
+    "position's zero has moved, as after another homing."
+)
+
+
+def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]]:
+    """The findings, and the share of each beside all the others."""
+    selection, evidence = findings.selection, findings.problem.evidence
+    values = estimated(findings)[selection.term_index(0) :]
+    result, alone = [], []
+    for number, (taken, parameters) in enumerate(zip(selection.taken, values, strict=True)):
+        effect = taken.trial.candidate.effect
+        if effect.moment:
+            parameters = dated(parameters, effect.moment, evidence)
+        share, held = _shares(findings, first, number)
+        alone.append(share)
+        if twins := _twins(findings, number):
+            share, held = _shares(_without(findings, twins), first, number)
+        text = sentence(effect.name, parameters, share, taken.rivals, _extent(evidence))
+        if taken.rephased:
+            text += REPHASED
+        if effect.late and evidence.motion.position is None:
+            text += f" {NO_POSITION}"
+        result.append(
+            Finding(
+                effect.name, effect.equation, text, taken.rivals, effect.separate_by, parameters,
+                share, held, taken.p_value, confirmed=taken.confirmed,
+            )
+        )  # fmt: skip
+    return result, alone
+
+
+def not_confirmed(better: Improved) -> list[Finding]:
+    """What this recording shows and the held-out one does not confirm."""
+    if not better.refuted:
+        return []
+    every, _ = reported(better.claimed, better.first)
+    text = " The held-out recording does not bear it out: it is not in the model."
+    return [
+        every[n]._replace(confirmed=False, sentence=every[n].sentence + text)
+        for n in better.refuted
+    ]
+
+
+def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> Finding:
+    """The finding that values of the baseline are wrong; `values`, its parameters as refitted."""
+    base, held = better.findings.selection.base, better.findings.problem.held
+    names = [p.name for p in (*base.terms[0].affine, *base.terms[0].nonlinear)]
+    errors = np.zeros(len(names)) if known.errors is None else known.errors
+    moved = {}
+    for i, before in wrong.moved.items():
+        now = values[names[i]]
+        if i not in wrong.within:
+            moved[names[i]] = Moved(
+                before, now.value, now.standard_error, now.unit, float(errors[i])
+            )
+    first = better.first
+    held_share = None if held is None else verification.share(first, base, first, held)
+    text = mismatch_sentence(moved, wrong.share)
+    if known.fit is not None:
+        text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
+    instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
+    return Finding(
+        MISMATCH, PARAMETER_MISMATCH.equation, text, (), "", moved,
+        wrong.share, held_share, wrong.p_value, instead=instead,
+    )  # fmt: skip
+
+
+def _twins(findings: Findings, number: int) -> list[int]:
+    """Later findings of the same effect, the last one first.
+
+    Two stops that stand for one which stiffens are each nearly all of it without the other. So the
+    earlier one is compared without the later, and their shares add up to that of the effect.
+    """
+    names = [taken.trial.candidate.effect.name for taken in findings.selection.taken]
+    return [n for n in reversed(range(number + 1, len(names))) if names[n] == names[number]]
+
+
+def _without(findings: Findings, numbers: list[int]) -> Findings:
+    """The findings compared without some, of which the last comes first."""
+    undelayed = findings.undelayed
+    for number in numbers:
+        undelayed = undelayed.without(number)
+    return findings._replace(undelayed=undelayed)
+
+
+def _extent(evidence: Evidence) -> Extent:
+    """The range of the position and the usual force."""
+    limits = evidence.limits
+    force = float(np.sqrt(np.mean(evidence.force**2)))
+    return Extent(float(limits.low), float(limits.high), force)
+
+
+def _shares(findings: Findings, first: Fit, number: int) -> tuple[float, float | None]:
+    """The part of the mismatch that a finding alone accounts for, here and held out.
+
+    `None` for what no other recording can say.
+    """
+    base = findings.examined_in(number).selection.base
+    less, last = findings.fit_without(number), findings.undelayed.selection.last
+    # No more than the base leaves, which refitting in a few steps may miss.
+    share = float((min(less.energy, base.energy) - last.energy) / first.energy)
+    held = findings.problem.held
+    if held is None or findings.selection.taken[number].trial.candidate.effect.momentary:
+        return share, None
+    without, with_it = findings.holdout_residuals(less, number)
+    power = np.sum(verification.residual(first, held) ** 2)
+    return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
+
+
+def dated(parameters: dict[str, Estimate], moment: str, evidence: Evidence) -> dict[str, Estimate]:
+    """Parameters with the error of a time that may be anywhere between two rows, s.
+
+    Each row is blurred by the kernel; at rest rows are far apart.
+    """
+    own = parameters[moment]
+    times = np.asarray(evidence.motion.time)[evidence.centre]
+    after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
+    width = times[after] - times[after - 1] + evidence.reach
+    error = np.hypot(own.standard_error, width / np.sqrt(12))
+    return parameters | {moment: own._replace(standard_error=np.float64(error))}

@@ -1,0 +1,97 @@
+"""The search for missing physics: in slip, then across reversals; with a late force put back."""
+
+from ..models import Model
+from ..terms.base import AbstractTerm
+from ..terms.effects import traits
+from . import verification
+from .baseline import as_given
+from .contest import Contest
+from .evidence import Motion
+from .findings import Findings, Solution, alone
+from .naming import Named, search
+from .problem import ALIGNED, Problem, across_reversals, problem_of
+from .timing import late, overlooked, with_late_force
+
+
+def searched(motion: Motion, problem: Problem, seed: int) -> Findings:
+    """The findings on a recording.
+
+    To first order a delay is a column; what it leaves of second order would be selected too. So
+    where the force acts late it is put back, and the search is done once more.
+    """
+    found = aligned(motion, problem, seed)
+    lateness = None
+    if any(traits(term).late for term in found.selection.last.terms):
+        # Rows across reversals hold more than a delay or a lag, of which not all may be known.
+        in_slip = found.problem.in_slip or found.problem, found.selection.start or found.selection
+        lateness = late(motion, *in_slip)
+    sure = lateness is not None
+    lateness = lateness or overlooked(motion, *found, seed)
+    if lateness is None:
+        return alone(found)
+    undone, structure = lateness.undone(motion), found.problem.structure
+    undelayed = aligned(undone, problem_of(undone, structure, before=found.problem), seed)
+    findings = with_late_force(found, undelayed, lateness)
+    after, before = (
+        verification.error(each.selection.last, each.problem.evidence)
+        for each in (findings.undelayed, found)
+    )
+    return alone(found) if not sure and after >= before else findings
+
+
+def nothing(problem: Problem) -> Findings:
+    """No findings, and no search for any."""
+    for candidates in problem.candidate_sets:
+        candidates.close()
+    remaining = Contest([], [], float(len(problem.base.residual)))
+    return alone(Solution(problem, Named(problem.base, problem.base, [], remaining)))
+
+
+def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
+    """The terms that a recording obeys beside a structure."""
+    return aligned(motion, problem_of(motion, structure), seed)
+
+
+def aligned(motion: Motion, problem: Problem, seed: int) -> Solution:
+    """The terms selected; once more if they change how force and motion are aligned."""
+    found = _selected(motion, problem, seed)
+    if found.selection.taken:
+        again = problem_of(motion, problem.structure, found.selection.last, found.problem)
+        interval = found.problem.evidence.limits.interval
+        if abs(again.delay - found.problem.delay) > ALIGNED * interval:
+            return _selected(motion, again, seed)
+    return found
+
+
+def _selected(motion: Motion, problem: Problem, seed: int) -> Solution:
+    """What rows in slip show, and then, where the axis yields there, rows across reversals.
+
+    What acts at reversals is ten times as large in those, and no term has quite its shape: the
+    remainder would hide all else.
+    """
+    in_slip = _select(problem, seed)
+    across = across_reversals(motion, problem)
+    if across is None:
+        return Solution(problem, in_slip)
+    return Solution(across, _select(across, seed, in_slip))
+
+
+def _select(problem: Problem, seed: int, in_slip: Named | None = None) -> Named:
+    evidence, candidates, wide = problem.evidence, problem.candidate_set, problem.wide_kernels
+    return search(evidence, problem.base, candidates, wide, seed, in_slip)
+
+
+def at_given(model: Model, findings: Findings, free: tuple[int, ...]) -> Findings:
+    """The findings beside the baseline's own values, but for those that the recording refutes."""
+
+    def given(solution: Solution) -> Solution:
+        problem, selection = solution
+        base, last = (
+            as_given(model, each, problem.evidence, free)
+            for each in (selection.base, selection.last)
+        )
+        return Solution(problem, selection._replace(base=base, last=last, given=model, free=free))
+
+    recorded = given(findings.recorded)
+    same = findings.undelayed is findings.recorded
+    return Findings(recorded, recorded if same else given(findings.undelayed))

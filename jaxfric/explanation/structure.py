@@ -1,0 +1,145 @@
+"""Where the baseline and the findings leave structure in the residual, and what of it counts."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..terms.effects import EFFECTS
+from .baseline import Mismatch
+from .bins import unit
+from .evidence import Evidence
+from .explained import Finding
+from .improvement import Improved
+from .locate import NOISY, Structure, locate, repeated
+from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY
+from .predictions import with_predictions
+from .problem import Problem
+from .regression import Fit, fast, fit
+from .significance import LEVEL
+
+
+def before_and_after(
+    better: Improved, wrong: Mismatch | None, seed: int
+) -> tuple[list[Structure], list[Structure]]:
+    """Where the baseline's residual has structure, and where that of the findings has."""
+    problem = better.findings.problem
+    before = _shown(better.first, problem, problem, LEAST_SHARE, seed)
+    if not better.findings.selection.taken and wrong is None:
+        return before, []
+    undelayed, selection = better.findings.undelayed
+    return before, _shown(selection.last, undelayed, problem, LATER_SHARE, seed)
+
+
+def _shown(
+    current: Fit, problem: Problem, recorded: Problem, least: float, seed: int
+) -> list[Structure]:
+    """The structure of a fit's residual that a wider kernel and the held-out recording show too."""
+    force = float(np.sqrt(np.mean(recorded.evidence.force**2)))
+    located = locate(with_predictions(problem.evidence, current), current, seed)
+    found = significant(located, least, force)
+    found = through_wide(found, current, problem.wide, seed)
+    return lasting(found, current, problem)
+
+
+def significant(found: list[Structure], least: float, force: float) -> list[Structure]:
+    """The structure that counts: by p-value, by share, and beyond the force sensor's linearity."""
+    floor = LINEARITY * force
+    return [s for s in found if s.p_value <= LEVEL and s.share >= least and s.size >= floor]
+
+
+def through_wide(
+    found: list[Structure], current: Fit, wide: Evidence | None, seed: int
+) -> list[Structure]:
+    """Without structure over noisy coordinates that a kernel of twice the width does not show.
+
+    These coordinates hold the acceleration, whose noise is in the residual too, by the loop's
+    answer to the encoder: a curve that follows that noise alone is 2⁵ to 2⁷ times weaker there in
+    power. Not tested is a curve larger than all that differs from row to row; but one over the
+    force's rate, which holds the acceleration's derivative, always is.
+    """
+    noise = fast(current)
+
+    def doubtful(each: Structure) -> bool:
+        rate = each.coordinate == "force_rate"
+        return rate or (each.coordinate in NOISY and each.size <= noise)
+
+    if wide is None or not any(map(doubtful, found)):
+        return found
+    again = fit(current.terms, with_predictions(wide, current), current.betas, 4)
+    there = locate(with_predictions(wide, again), again, seed)
+    sure = {s.coordinate for s in there if s.p_value <= LEVEL and s.share >= LEAST_SHARE}
+    return [s for s in found if s.coordinate in sure or not doubtful(s)]
+
+
+def lasting(found: list[Structure], current: Fit, problem: Problem) -> list[Structure]:
+    """The structure that the held-out recording shows too, and that is no slow part of the noise.
+
+    Every axis has a load that wanders: a slow one that is no larger than what differs from row to
+    row is the same noise.
+    """
+    found = [s for s in found if s.coordinate != "time" or s.size > fast(current)]
+    if problem.held is None:
+        return found
+    return repeated(found, current, with_predictions(problem.held, current))
+
+
+def documents(
+    found: list[Structure],
+    findings: list[Finding],
+    first: Fit,
+    units: Mapping[str, str],
+    shared: frozenset[str],
+) -> list[dict[str, Any]]:
+    """The document's `where`: structure, and where findings act that no free curve shows.
+
+    `shared`: coordinates over which the other recording leaves structure as well.
+    """
+    return with_findings([document(s, units, shared) for s in found], findings, first)
+
+
+def with_findings(
+    where: list[dict[str, Any]], findings: list[Finding], first: Fit
+) -> list[dict[str, Any]]:
+    """With the coordinates of findings that no free curve shows: they act at a few rows, say."""
+    for finding in findings:
+        own = [name.removesuffix("_lines") for name in EFFECTS[finding.effect].coordinates]
+        if not own or any(each["coordinate"] in own for each in where):
+            continue
+        power = max(finding.share, 0.0) * first.energy / len(first.residual)
+        each = {
+            "coordinate": own[0],
+            "share": finding.share,
+            "size": float(np.sqrt(power)),
+            "p_value": finding.p_value,
+            "detail": f"where {finding.effect.replace('_', ' ')} acts",
+        }
+        where = [*where, each]
+    return where
+
+
+def document(
+    found: Structure, units: Mapping[str, str], shared: frozenset[str] = frozenset()
+) -> dict[str, Any]:
+    """One coordinate's structure, with the strongest point of its curve in words."""
+    detail, its = "", unit(found.coordinate, units)
+    if found.coordinate == "position_lines":
+        detail = f"period {1 / found.peak:.4g} {its}"
+    elif found.coordinate == "time_lines":
+        detail = f"{found.peak:.4g} Hz"
+    elif found.coordinate == "force_rate":
+        late = float(found.curve[1][0])
+        detail = f"the force acts {abs(late):.2g} s {'late' if late > 0 else 'early'}"
+    elif len(found.curve[0]):
+        at, height = found.curve
+        peak = int(np.argmax(np.abs(height)))
+        detail = f"strongest at {at[peak]:.3g} {its}".rstrip()
+    if found.coordinate in shared:
+        detail += ", as in the other recording"
+    return {
+        "coordinate": found.coordinate.removesuffix("_lines"),
+        "share": found.share,
+        "size": found.size,
+        "p_value": found.p_value,
+        "detail": detail,
+    }

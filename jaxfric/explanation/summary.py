@@ -1,0 +1,158 @@
+"""The explanation in summary: findings, verdict, errors, and where structure is left."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..checks import MATTERS, Remark
+from ..data.recording import Recording
+from ..identification.uncertainty import Estimate
+from ..terms.effects import EFFECTS
+from . import parameters as spelled, structure, verification
+from .baseline import Baseline, Mismatch, freed
+from .curves import curves
+from .doubts import accelerates, doubts, not_better
+from .errors import document, filtered_errors
+from .explained import ELSEWHERE, Explanation, Finding
+from .figures import Figures
+from .improvement import Improved, holdout_model
+from .naming import Named
+from .partial_residuals import moved as moved_curve, partial_residuals
+from .reported import NO_POSITION, not_confirmed, reported, wrong_values
+from .uncertainty import estimated
+from .verdict import rough, stand_ins, verdict_of
+
+
+def summarise(
+    recording: Recording,
+    better: Improved,
+    known: Baseline,
+    wrong: Mismatch | None,
+    figures: Figures,
+    remarks: Sequence[Remark] = (),
+    seed: int = 0,
+) -> Explanation:
+    """The explanation of a recording from all that was found about it.
+
+    **Arguments:** `better`: the baseline and the findings with which the model is better; `known`:
+    the baseline as it was given, and `wrong`, which of its values are; `figures`: the force errors
+    of models; `remarks`: what was said about the recording before.
+    """
+    units, problem, selection = recording.unit_names, better.findings.problem, _selection(better)
+    before, after = structure.before_and_after(better, wrong, seed)
+    findings, alone = reported(better.findings, better.first)
+    refuted = not_confirmed(better)
+    shares = _by_effect(findings)
+    values = _values(better, wrong, units)
+    pictures = partial_residuals(better)
+    if wrong is not None:
+        findings = [wrong_values(values, wrong, known, better), *findings]
+        pictures = [moved_curve(better, wrong), *pictures]
+    pairs = sorted(zip(findings, pictures, strict=True), key=lambda pair: -pair[0].share)
+    findings = [finding for finding, _ in pairs]
+    models = tuple(spelled.model(now, recording.units) for now in (better.first, selection.last))
+    filtered = filtered_errors(better.findings, better.first)
+    if not any(remark.severe for remark in remarks):
+        remarks = [*remarks, *_doubts(better)]
+    errors = document(better, filtered, models[1], figures)
+    remarks = [*remarks, *_elsewhere(errors)]
+    new, later = ([s for s in some if s.coordinate not in known.left] for some in (before, after))
+    much = rough(filtered, shares) and not known.rough
+    standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
+    absent = (*better.dropped, *(finding.effect for finding in refuted))
+    return Explanation(
+        verdict=verdict_of(findings, new, later, much, standing, remarks, known.fit is not None),
+        where=structure.documents(before, findings, better.first, units, known.left),
+        findings=findings,
+        not_confirmed=refuted,
+        fit=errors,
+        not_visible=_not_visible(selection, units, absent),
+        model=models[1],
+        baseline=models[0],
+        baseline_name=known.name,
+        baseline_parameters=values,
+        recording=facts(recording),
+        curves=curves(before[:6], better, models) | {"findings": [each for _, each in pairs]},
+        warnings=[remark.to_dict() for remark in remarks],
+        holdout_model=None if problem.held is None else holdout_model(better.findings),
+    )
+
+
+def _selection(better: Improved) -> Named:
+    return better.findings.selection
+
+
+def _by_effect(findings: Sequence[Finding]) -> dict[str, float]:
+    """The shares of the findings, summed by effect."""
+    shares: dict[str, float] = {}
+    for finding in findings:
+        shares[finding.effect] = shares.get(finding.effect, 0.0) + max(finding.share, 0.0)
+    return shares
+
+
+def _values(better: Improved, wrong: Mismatch | None, units) -> dict[str, Estimate]:
+    """The baseline's parameters in the model that is reported."""
+    last = _selection(better).last
+    last = last if wrong is None else freed(last, wrong.moved)
+    return spelled.estimates(last, better.findings.problem.block, units)[0]
+
+
+def _doubts(better: Improved) -> list[Remark]:
+    """What makes the model that is reported doubtful, and what was dropped for its errors."""
+    (recorded, _), (problem, selection) = better.findings
+    evidence = recorded.evidence
+    values = spelled.estimates(selection.last, problem.block, evidence.motion.unit_names)[0]
+    if accelerates(values):  # with what other rows say of it
+        values = estimated(better.findings)[0]
+    remarks = doubts(selection.last, problem, values, better.after.filtered)
+    if better.spoilt is not None:
+        remark = not_better(better.dropped, better.before, better.spoilt)
+        late = any(EFFECTS[name].late for name in better.dropped)
+        if late and evidence.motion.position is None:
+            remark = remark._replace(text=f"{remark.text} {NO_POSITION}")
+        remarks.append(remark)
+    return remarks
+
+
+def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
+    """That the held-out recording obeys other values of the same model, where that matters.
+
+    Less is told in the summary alone.
+    """
+    held = errors["filtered_holdout_force_error"]
+    refitted = errors["filtered_holdout_refitted_error"]
+    if refitted is None or not held["after"] > ELSEWHERE * refitted:
+        return []
+    if held["after"] ** 2 - refitted**2 < MATTERS**2:
+        return []
+    text = (
+        f"The held-out recording is left with {held['after']:.0%} of its force, and with "
+        f"{refitted:.0%} where the model is fitted to it: it is of another axis, in other units or "
+        "of another sign, or this recording does not determine the values that hold there."
+    )
+    return [Remark("holdout_differs", text, False)]
+
+
+def _not_visible(selection: Named, units, absent: Sequence[str]) -> list[dict[str, Any]]:
+    """The smallest visible size of each effect that was neither found nor dropped."""
+    sizes = verification.smallest_visible(selection.left, selection.last)
+    return [
+        {"effect": effect, "smallest_detectable": float(size), "unit": units["force"]}
+        for effect, size in sorted(sizes.items(), key=lambda item: item[1])
+        if effect not in selection.names and effect not in absent
+    ]
+
+
+def facts(recording: Recording) -> dict[str, Any]:
+    """File, samples, duration, s, and rate, Hz, of a recording."""
+    time, mask = np.asarray(recording.time), np.asarray(recording.mask)
+    steps = np.diff(time[mask])
+    steps = steps[steps > 0]
+    return {
+        "file": recording.source,
+        "sha256": recording.sha256 or None,
+        "samples": int(mask.sum()),
+        "duration": float(steps.sum()),
+        "sample_rate": float(1 / np.median(steps)),
+    }

@@ -1,0 +1,94 @@
+"""The verdict: whether findings account for the mismatch, and what is left of it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..checks import Remark
+from ..terms.effects import EFFECTS
+from .doubts import NOT_BETTER
+from .explained import Finding
+from .naming import LINEARITY
+
+# Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
+# part; of four times its size, sixteen times the power, something is missing, wherever.
+ROUGH = 4.0
+# Where the findings leave half of the mismatch's size, a quarter of its power, less will do: more
+# than half as much again as that noise in power. So it will where they leave more than the
+# geometric mean of mismatch and noise.
+HALF_ROUGH, HALF = 1.25, 0.5
+
+
+def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
+    """Whether the residual is far above the noise of neighbouring rows, or a large part remains.
+
+    The findings (`shares` by effect) must explain the held-out recording as well: to within four
+    times the noise, and its larger part. Effects of time alone need not recur: held-out error is
+    allowed in proportion to what they explain here. Without findings a base that has to extrapolate
+    may miss that recording by more.
+    """
+    here, held = fit["force_error"], fit["holdout_force_error"]
+
+    def above(view, size: float) -> bool:
+        return view["after"] > max(size * fit["noise_floor"], LINEARITY)
+
+    def left(view) -> float:
+        return (view["after"] / max(view["before"], 1e-300)) ** 2
+
+    much, far = [here], False
+    if held is not None:
+        momentary = [share for name, share in shares.items() if EFFECTS[name].momentary]
+        excused = HALF_ROUGH**2 * (left(here) + sum(momentary)) if momentary else 0.0
+        much += [held] if left(held) > excused else []
+        if not momentary:
+            far = above(held, ROUGH)
+    # The findings go from the mismatch to the noise, and less than half the way (in decades).
+    halfway = np.sqrt(here["before"] * fit["noise_floor"])
+    many = any(left(view) > HALF**2 and above(view, HALF_ROUGH) for view in much)
+    many |= here["after"] > max(halfway, LINEARITY)
+    return bool(above(here, ROUGH) or (shares and (many or far)))
+
+
+# Of two effects that are there each has a part of its own; of three or more that share a quarter of
+# what they account for, none can claim it: they stand in for one that the library does not have.
+STAND_INS = 3
+CLAIMED = 0.75
+
+
+def stand_ins(alone: list[float], removed: float) -> bool:
+    """Whether many findings share what they remove of the mismatch, instead of adding up to it.
+
+    `alone`: what each removes beside all the others.
+    """
+    claimed = sum(max(share, 0.0) for share in alone)
+    return len(alone) >= STAND_INS and claimed < CLAIMED * removed
+
+
+def verdict_of(
+    findings: Sequence[Finding],
+    before,
+    after,
+    rough: bool,
+    standing: bool,
+    noted: Sequence[Remark],
+    compared: bool,
+) -> str:
+    """The verdict, which claims no more than the remarks allow.
+
+    **Arguments:** `before`, `after`: structure that the baseline and the findings leave; `rough`
+    and `standing`, by [`rough`][] and [`stand_ins`][]; `noted`: the remarks; `compared`: whether
+    with another recording, in which what has no name may be as well.
+    """
+    verdict = _by_structure(findings, before, after, rough, standing)
+    doubtful = any(remark.severe for remark in noted)
+    if verdict == "explained" and doubtful:
+        return "partly_explained"
+    dropped = any(remark.name == NOT_BETTER for remark in noted) and not compared
+    return "unexplained" if verdict == "consistent" and (doubtful or dropped) else verdict
+
+
+def _by_structure(findings, before, after, rough: bool, standing: bool) -> str:
+    if findings:
+        return "partly_explained" if after or rough or standing else "explained"
+    return "unexplained" if before or rough else "consistent"
