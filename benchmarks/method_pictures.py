@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxfric.cli.demo import EFFECT, SEED, SIZE
 from jaxfric.explanation import evidence, regression, reversals, significance
+from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.predictions import with_predictions
 from jaxfric.explanation.problem import problem_of
 from jaxfric.models import named
@@ -68,7 +69,7 @@ def turns():
         axes, (("presliding",), ()), ("yields: presliding", "sticks"), strict=True
     ):
         machine = concealed.draw(122, effects, 0.15)
-        motion = evidence.motion_of(concealed.record(machine).recording)
+        motion = motion_of(concealed.record(machine).recording)
         seen = evidence.gather(motion)
         base = regression.fit([named(machine.baseline)], seen)
         for at, level in reversals.passages(motion, seen, base):

@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 
-from jaxfric.explanation.evidence import NODES
+from jaxfric.explanation.nodes import NODES
 
 MOST = 30
 THRESHOLD = 0.1

@@ -15,6 +15,7 @@ from jaxfric.explanation import (
     candidates,
     contest,
     curves,
+    evaluation,
     evidence,
     explain,
     holdout,
@@ -36,6 +37,7 @@ from jaxfric.explanation import (
     verdict,
     verification,
 )
+from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effects import EFFECTS, disturbance_pulses
@@ -400,13 +402,13 @@ def tried(seen):
 )
 def test_numbers_of_the_recording_are_data_of_a_compiled_term(make, beta, healthy, monkeypatch):
     traced = []
-    columns = evidence._columns
+    columns = evaluation._columns
     counted = lambda *arguments: traced.append(1) or columns(*arguments)  # noqa: E731
-    monkeypatch.setattr(evidence, "_compiled", eqx.filter_jit(counted))
+    monkeypatch.setattr(evaluation, "_compiled", eqx.filter_jit(counted))
     motion = evidence.gather(healthy[0]).motion
     for number in (0.1, 0.25, 1.0):
         term = make(number)
-        plain, _ = evidence.evaluate(term, jnp.asarray([beta, beta]), motion)
+        plain, _ = evaluation.evaluate(term, jnp.asarray([beta, beta]), motion)
         expected = term.with_beta(jnp.asarray(beta)).columns(motion).T
         np.testing.assert_allclose(plain[1], expected, rtol=1e-12, atol=1e-12)
     assert len(traced) == 1
@@ -765,12 +767,12 @@ def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
 
 def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     gaussian = models.named("gaussian")
-    motion = evidence.motion_of(healthy[0])
+    motion = motion_of(healthy[0])
     seen = evidence.gather(motion)
     columns_of = candidates.CandidateSet(seen, gaussian)
     assert columns_of.serves(evidence.gather(motion, seen.width, delay=3e-4))
     assert not columns_of.serves(evidence.gather(motion, 2 * seen.width))
-    assert not columns_of.serves(evidence.gather(evidence.motion_of(healthy[1]), seen.width))
+    assert not columns_of.serves(evidence.gather(motion_of(healthy[1]), seen.width))
     first = problem.problem_of(healthy[0], gaussian)
     again = problem.problem_of(healthy[0], gaussian, first.base, first)
     assert again.candidate_set is first.candidate_set
@@ -797,12 +799,12 @@ def test_a_wider_kernel_that_leaves_too_little_to_judge_by_is_done_without(healt
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     assert posed.wide is not None
     monkeypatch.setattr("jaxfric.explanation.significance.FEWEST", 10_000)
-    assert problem._wider(evidence.motion_of(healthy[0]), posed.evidence) is None
+    assert problem._wider(motion_of(healthy[0]), posed.evidence) is None
 
 
 def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
     gaussian = models.named("gaussian")
-    scanned = evidence.gather(evidence.motion_of(healthy[0]))
+    scanned = evidence.gather(motion_of(healthy[0]))
     pitch = 1 / (1.5 * spectral_lines.line_frequencies(scanned, "position")[-1])
     run = planted(healthy[0], terms.Cogging(), (3.0, 1.0), (pitch,))
     posed = problem.problem_of(run, gaussian)

@@ -9,6 +9,7 @@ import pytest
 
 from jaxfric import Recording, explain
 from jaxfric.explanation import evidence, naming, regression, reversals, search
+from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.problem import across_reversals, problem_of
 from jaxfric.models import named
 from jaxfric.terms.effects import EFFECTS
@@ -62,7 +63,7 @@ def sticking(**options):
 
 
 def yields(recording, seen=None):
-    seen = seen or evidence.gather(evidence.motion_of(recording))
+    seen = seen or evidence.gather(motion_of(recording))
     base = regression.fit([named("symmetric-coulomb-viscous")], seen)
     return reversals.yields(recording, seen, base)
 
@@ -92,7 +93,7 @@ def test_one_or_two_large_slopes_say_nothing_about_the_others():
 
 def test_without_a_position_nothing_is_said():
     recording = yielding()
-    seen = evidence.gather(evidence.motion_of(recording))
+    seen = evidence.gather(motion_of(recording))
     speed = jnp.gradient(recording.position, recording.time)
     bare = dataclasses.replace(recording, position=None, velocity=speed)
     assert yields(recording, seen) and not yields(bare, seen)
@@ -116,7 +117,7 @@ def hilly(seed=0):
 
 def searched(recording):
     problem = problem_of(recording, named("symmetric-coulomb-viscous"))
-    return search._selected(evidence.motion_of(recording), problem, 0)
+    return search._selected(motion_of(recording), problem, 0)
 
 
 def names(found):

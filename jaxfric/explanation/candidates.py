@@ -11,7 +11,8 @@ from ..terms.base import AbstractTerm, leaves
 from ..terms.effect import Effect, View, inside
 from ..terms.effects import EFFECTS
 from ..units import TURNS
-from .evidence import NODES, Evidence
+from .evidence import Evidence
+from .nodes import NODES
 from .predictions import PREDICTED
 from .spectral_lines import SpectralLines, line_frequencies, time_frequencies
 from .threads import begin

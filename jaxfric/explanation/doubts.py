@@ -8,8 +8,9 @@ from .. import terms as laws
 from ..checks import Remark
 from ..identification.uncertainty import Estimate
 from ..terms.base import summands
-from .evidence import NODES, Evidence
+from .evidence import Evidence
 from .intervals import covariance
+from .nodes import NODES
 from .problem import Problem
 from .regression import Fit
 

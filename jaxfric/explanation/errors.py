@@ -9,10 +9,11 @@ from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
 from .baseline import SURE, at_values
-from .evidence import gather, motion_of
+from .evidence import gather
 from .figures import Figures, cast
 from .findings import Findings, Solution
 from .improvement import Improved
+from .motion import motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .significance import blocks

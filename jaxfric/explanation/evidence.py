@@ -1,16 +1,11 @@
 """A recording as rows of one regression on the host: small, compiled once, for many candidates.
 
-Explaining tries dozens of terms on one recording, each at dozens of parameter values. So the
+A search tries dozens of terms on one recording, each at dozens of parameter values. So the
 recording is first reduced to nodes, local means a sixth of the kernel apart, and every row of the
 weak form is a weighted sum of thirteen of them: the same linear functional for the force and for
 every column, at a cost that follows the record's bandwidth and not its sample rate.
 """
 
-import copy
-import dataclasses
-import operator
-from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,57 +13,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .. import programs, signals
-from ..data.recording import Recording, pad
-from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
+from .. import signals
+from ..data.recording import Recording
+from ..terms import KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
 from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
-
-# Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
-# which is below 1e-4 of its peak.
-NODES = 6
-# Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
-STRIDE = 3
-# Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
-# neighbour that gives its derivative; of a load that is stepped along the motion many at once, as
-# four times as many steps side by side take hardly longer.
-BATCH, PAIR, STEPPED = 8, 2, 32
-
-
-class Motion(NamedTuple):
-    """A recording whose velocity has been derived, once for all the rows that are made of it.
-
-    `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
-    few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
-    `signals.smoothing`.
-    """
-
-    recording: Recording
-    padded: Recording
-    smoothed: float
-
-    def forced(self, force: Any) -> "Motion":
-        """The same motion with another force, N, `(N,)`."""
-        other = dataclasses.replace(self.recording, force=jnp.asarray(force))
-        longer = pad(other, self.padded.num_samples).force
-        return self._replace(recording=other, padded=dataclasses.replace(self.padded, force=longer))
-
-
-def motion_of(recording: "Recording | Motion") -> Motion:
-    """The motion of a recording by its position, where it has one.
-
-    A recorded velocity is late by its filter, which would look like a delay of the force.
-    """
-    if isinstance(recording, Motion):
-        return recording
-    return _derived(from_position(recording))
-
-
-def from_position(recording: Recording) -> Recording:
-    """A recording without its velocity, where it has a position to derive one from."""
-    if recording.position is None:
-        return recording
-    return dataclasses.replace(recording, velocity=None)
+from .evaluation import BATCH, PAIR, STEPPED, evaluate
+from .motion import Motion, derived
+from .nodes import NODES, STRIDE, averaged, node_signals, padded, windows
 
 
 class Evidence(NamedTuple):
@@ -156,76 +108,8 @@ def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndar
     return np.einsum("...ck,ck->...c", centred, weights)[..., rows]
 
 
-def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
-    """Columns, `(B, p, M)`, and momentum, `None` where there is none, at β, `(B, d)`.
-
-    Compiled once for each kind of term and each of the few B: numbers of the recording that are
-    built into a term's structure (the middle of the stroke, say) go in as data.
-    """
-    numbers: list[float] = []
-
-    def take(number: float) -> float:
-        numbers.append(number)
-        return 1.0
-
-    form = _renumbered(term, take)
-    motion = _without_known(motion, term.coordinates)
-    return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
-
-
-def _without_known(motion: Recording, kept: frozenset[str] = frozenset()) -> Recording:
-    """A motion without what a simulator says of it, for which nothing is to be compiled anew."""
-    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN) or k in kept}
-    if len(channels) == len(motion.channels):
-        return motion
-    return dataclasses.replace(motion, channels=channels)
-
-
-def _columns(form, betas, numbers, motion):
-    def one(beta):
-        inside = iter(numbers)
-        known = _renumbered(form.with_beta(beta), lambda _: next(inside))
-        return known.columns(motion).T, known.momentum(motion).T if form.inertial else None
-
-    if form.nonlinear:
-        return jax.vmap(one)(betas)
-    alone = one(betas[0])
-    return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (len(betas), *x.shape)), alone)
-
-
-_compiled = programs.compiled(_columns, optimised=programs.LITTLE)
-
-
-def _renumbered(part: Any, number: Callable[[float], Any]) -> Any:
-    """A term whose static floating-point numbers, however deep, are replaced; but zeros, which are
-    another form of the law, stay.
-    """
-    if isinstance(part, float) and part != 0:
-        return number(part)
-    if isinstance(part, tuple):
-        parts = tuple(_renumbered(each, number) for each in part)
-        return part if all(map(operator.is_, parts, part)) else parts
-    if not isinstance(part, AbstractTerm):
-        return part
-    changed = {}
-    for name, value in vars(part).items():
-        if name in _static(type(part)) or isinstance(value, tuple | AbstractTerm):
-            new = _renumbered(value, number)
-            if new is not value:
-                changed[name] = new
-    if not changed:
-        return part
-    other = copy.copy(part)
-    for name, value in changed.items():
-        object.__setattr__(other, name, value)
-    return other
-
-
-@cache
-def _static(kind: type) -> frozenset[str]:
-    """The names of a term's fields that are part of its structure."""
-    fields = dataclasses.fields(kind)
-    return frozenset(field.name for field in fields if field.metadata.get("static"))
+# Fewer rows cannot tell structure from chance.
+FEWEST_ROWS = 32
 
 
 def gather(
@@ -246,9 +130,8 @@ def gather(
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
-    motion = recording if isinstance(recording, Motion) else _derived(recording)
+    motion = recording if isinstance(recording, Motion) else derived(recording)
     prepared, count = motion.padded, motion.recording.num_samples
-    source = motion.recording.source or "The recording"
     limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
@@ -256,36 +139,26 @@ def gather(
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / NODES))
     span = float(step * NODES * limits.interval)
-    parts = _node_signals(prepared, limits, step, delay, motion.smoothed)
-    index, whole, average, slope = _windows(parts, span)
-    speed = parts["velocity"][index]
-    moving = np.abs(speed) > limits.slowest
-    one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
-    slips = np.sum(average * moving, axis=1) > 0.5 if reversals else moving.all(axis=1) & one_way
-    rows = np.flatnonzero(whole & slips)
-    if len(rows) < 32:
+    parts = node_signals(prepared, limits, step, delay, motion.smoothed)
+    index, whole, average, slope = windows(parts, span)
+    rows = _moving(parts["velocity"][index], whole, average, limits.slowest, reversals)
+    if len(rows) < FEWEST_ROWS:
         raise ValueError(
-            f"{source} leaves {len(rows)} independent stretches in "
-            "which the axis slips; at least 32 are needed to tell structure from chance. Record "
-            "longer, or move more."
+            f"{motion.recording.source or 'The recording'} leaves {len(rows)} independent "
+            f"stretches in which the axis slips; at least {FEWEST_ROWS} are needed to tell "
+            "structure from chance. Record longer, or move more."
         )
-    nodes = _padded(parts, prepared)
+    nodes = padded(parts, prepared)
     centre = index[rows, NODES]
     force = np.sum(average * parts["force"][index], axis=1)[rows]
-    whole_known = KNOWN_FORCE if KNOWN_MOMENTUM not in prepared.channels else KNOWN_REST
-    known = parts.get(f"channel {whole_known}")
-    target = force if known is None else force - np.sum(average * known[index], axis=1)[rows]
-    average, slope = _averaged(average), _averaged(slope)
-    if known is not None and whole_known == KNOWN_REST:
-        moving_known = parts[f"channel {KNOWN_MOMENTUM}"]
-        target = target - np.sum(slope * moving_known[index], axis=1)[rows]
+    target = _without_simulated(force, parts, index, rows, average, averaged(slope))
     pads = nodes.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
     return Evidence(
         motion=nodes,
         nodes=len(parts["time"]),
-        average=average,
-        slope=slope,
+        average=averaged(average),
+        slope=averaged(slope),
         rows=rows,
         force=force,
         target=target,
@@ -299,18 +172,6 @@ def gather(
     )
 
 
-def _derived(recording: Recording) -> Motion:
-    # The name and the number of segments would be compiled in.
-    nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
-    bare = _without_known(nameless)
-    padded, whole = (pad(log, _length(recording.num_samples)) for log in (bare, nameless))
-    smoothed = 0.0
-    if padded.velocity is None:
-        choice = signals.choose(padded)
-        padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
-    return Motion(recording, dataclasses.replace(padded, channels=whole.channels), smoothed)
-
-
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
 # axis hardly accelerates, the noise of its acceleration would ask for wider ones.
 KERNELS = 192
@@ -320,120 +181,21 @@ def _widest(recording: Recording) -> int:
     return max(16, int(np.count_nonzero(np.asarray(recording.mask))) // KERNELS)
 
 
-def _length(count: int) -> int:
-    """The next power of two, or three quarters of it, so that few programs are compiled."""
-    octave = max(256, 1 << (count - 1).bit_length())
-    return octave if count > octave * 3 // 4 else octave * 3 // 4
+def _moving(speed: np.ndarray, whole: np.ndarray, average: np.ndarray, slowest: float, reversals):
+    """Numbers of the windows in slip of one direction; with `reversals` all but those at rest."""
+    moving = np.abs(speed) > slowest
+    one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
+    slips = np.sum(average * moving, axis=1) > 0.5 if reversals else moving.all(axis=1) & one_way
+    return np.flatnonzero(whole & slips)
 
 
-def _node_signals(
-    recording: Recording, limits: Scales, step: int, delay: float, smoothed: float
-) -> dict:
-    """Local means of every signal, `step` samples apart, with the run that each node lies in.
-
-    `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
-    """
-    time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
-    linked = _continuous(time, mask, np.asarray(recording.segment), limits.interval)
-    run = np.pad(np.cumsum(~linked), (1, 0))
-    steps = np.where(linked, np.diff(time), limits.interval)
-    series = {
-        "time": time,
-        "force": np.asarray(recording.force, float),
-        "velocity": np.asarray(recording.velocity, float),
-        "elapsed": np.pad(np.cumsum(steps), (1, 0)),
-    }
-    if recording.position is not None:
-        series["position"] = np.asarray(recording.position, float)
-    series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
-    if delay:
-        series["force"] = _shifted(time, series["force"], run, delay)
-    centres = np.arange(0, len(time), step)
-    offsets = np.arange(-(step - 1), step)
-    at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
-    near = mask[at] & (run[at] == run[centres][:, None])
-    near &= centres[:, None] + offsets[None, :] == at
-    weight = np.where(near, (step - np.abs(offsets))[None, :], 0.0)
-    total = weight.sum(axis=1)
-    weight /= np.where(total > 0, total, 1.0)[:, None]
-    means = {
-        name: np.einsum("ij,ij->i", weight, np.where(near, values[at], 0.0))
-        for name, values in series.items()
-    }
-    label = np.where(total > 0, run[centres], -1 - np.arange(len(centres)))
-    # Terms are functions of the motion at an instant, not of its mean: the curvature that the
-    # triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
-    # and the columns' weights take it off again, so that force and columns are averaged alike. So
-    # is what the derivative took off the velocity, which would look like a load on a spring.
-    inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    forces = {"force", f"channel {KNOWN_FORCE}", f"channel {KNOWN_REST}"}
-    for name in set(means) - forces - {"time", "elapsed"}:
-        values = means[name]
-        bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
-        means[name] = values.copy()
-        derived = name == "velocity" or name.endswith("momentum")
-        lost = 1 / 12 + (smoothed / step**2 if derived else 0.0)
-        means[name][inner] -= lost * bend
-    return means | {"run": label}
-
-
-def _continuous(time, mask, segment, interval) -> np.ndarray:
-    """As [`continuous`][jaxfric.signals.continuous], on the host."""
-    steps = np.diff(time)
-    together = mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
-    return together & (steps > 0) & (steps <= signals.GAP_FACTOR * interval)
-
-
-def _shifted(time, force, run, delay):
-    """The force `delay` later, s: u(t + delay), inside each run."""
-    late = np.interp(time + delay, time, force) if np.all(np.diff(time) > 0) else None
-    if late is not None:
-        return late
-    out = np.empty_like(force)
-    for label in np.unique(run):
-        own = run == label
-        out[own] = np.interp(time[own] + delay, time[own], force[own])
-    return out
-
-
-def _windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
-    """Nodes of the row around every third node, whether they lie in one run, and their weights."""
-    middle = np.arange(NODES, len(parts["time"]) - NODES, STRIDE)
-    index = middle[:, None] + np.arange(-NODES, NODES + 1)[None, :]
-    whole = parts["run"][index[:, 0]] == parts["run"][index[:, -1]]
-    even = np.arange(-NODES, NODES + 1) * reach / NODES
-    offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
-    offset = np.where(whole[:, None], offset, even[None, :])
-    tau = offset / reach
-    average = np.maximum(1 - tau**2, 0.0) ** 4
-    slope = 8 * tau * np.maximum(1 - tau**2, 0.0) ** 3
-    average /= average.sum(axis=1, keepdims=True)
-    slope -= average * slope.sum(axis=1, keepdims=True)
-    slope /= np.sum(slope * offset, axis=1, keepdims=True)
-    return index, whole, average, slope
-
-
-def _averaged(weights: np.ndarray) -> np.ndarray:
-    """The weights of a triangle's mean around each node, by its second moment."""
-    bend = np.zeros_like(weights)
-    bend[:, 1:-1] = weights[:, 2:] - 2 * weights[:, 1:-1] + weights[:, :-2]
-    bend[:, 0], bend[:, -1] = weights[:, 1], weights[:, -2]
-    return weights + bend / 12
-
-
-def _padded(parts: dict, recording: Recording) -> Recording:
-    """The nodes as a recording, lengthened as [`_length`][] says."""
-    count = len(parts["time"])
-    length = _length(count)
-
-    def pad(values):
-        return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))
-
-    position = pad(parts["position"]) if "position" in parts else None
-    channels = {k[8:]: pad(v) for k, v in parts.items() if k.startswith("channel ")}
-    labels = np.unique(parts["run"], return_inverse=True)[1].astype(np.int32)
-    segment = jnp.asarray(np.pad(labels, (0, length - count), mode="edge"))
-    return Recording(
-        pad(parts["time"]), pad(parts["force"]), position, pad(parts["velocity"]),
-        segment=segment, channels=channels, num_segments=1, units=recording.units,
-    )  # fmt: skip
+def _without_simulated(force: np.ndarray, parts: dict, index, rows, average, slope) -> np.ndarray:
+    """The force of the rows without what another simulator has computed, where there is that."""
+    momentum = parts.get(f"channel {KNOWN_MOMENTUM}")
+    known = parts.get(f"channel {KNOWN_FORCE if momentum is None else KNOWN_REST}")
+    if known is None:
+        return force
+    target = force - np.sum(average * known[index], axis=1)[rows]
+    if momentum is None:
+        return target
+    return target - np.sum(slope * momentum[index], axis=1)[rows]

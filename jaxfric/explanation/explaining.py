@@ -18,13 +18,13 @@ from .attributes import in_own_words
 from .baseline import Baseline, Mismatch, at_values, baseline_of, mismatch
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
-from .evidence import motion_of
 from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
 from .holdout import check_signals, confirmed
 from .improvement import Improved, improved
 from .inputs import Inputs, as_seen, prepare
+from .motion import motion_of
 from .problem import Problem, problem_of, with_holdout
 from .search import at_given, nothing, obeying, searched
 from .summary import facts, summarise

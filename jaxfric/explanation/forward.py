@@ -11,7 +11,7 @@ from ..models import Model
 from ..simulation.simulating import simulate
 from ..terms.base import summands
 from ..terms.presliding import AbstractMemory
-from .evidence import from_position
+from .motion import from_position
 
 # A piece lasts this part of the typical time between reversals: long enough for a missing force to
 # move the axis, short enough for the motion to stay near the recorded one.

@@ -7,10 +7,10 @@ the held-out recording is reported as not confirmed, and the model does without 
 from ..data.recording import Recording
 from . import parameters as spelled, verification
 from .baseline import as_given
-from .evidence import Motion
 from .figures import Figures
 from .findings import Findings, Solution
 from .improvement import Improved, errors_of_base, force_errors
+from .motion import Motion
 from .naming import Named
 from .problem import with_holdout
 from .uncertainty import estimated

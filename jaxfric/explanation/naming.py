@@ -12,8 +12,9 @@ from ..models import Model
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet
 from .contest import RIVAL, Contest, Finalist, Trial, contest
-from .evidence import Evidence, Motion
+from .evidence import Evidence
 from .intervals import left_out
+from .motion import Motion
 from .plausible import machines, nil
 from .predictions import with_predictions
 from .problem import BETWEEN, WideKernels

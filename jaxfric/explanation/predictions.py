@@ -4,7 +4,9 @@ import numpy as np
 
 from ..terms import KNOWN_FORCE
 from ..terms.effects import traits
-from .evidence import NODES, PAIR, Evidence, evaluate
+from .evaluation import PAIR, evaluate
+from .evidence import Evidence
+from .nodes import NODES
 from .regression import Fit
 
 # The signals that a fit predicts at the nodes.

@@ -9,7 +9,8 @@ from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from ..terms.effects.late import TransportDelay
 from .candidates import CandidateSet
-from .evidence import Evidence, Motion, gather, motion_of
+from .evidence import Evidence, gather
+from .motion import Motion, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .reversals import yields

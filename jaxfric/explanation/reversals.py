@@ -13,7 +13,8 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..models import Model
-from .evidence import Evidence, Motion, motion_of
+from .evidence import Evidence
+from .motion import Motion, motion_of
 from .regression import Fit
 from .significance import DRAWS
 

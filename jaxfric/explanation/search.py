@@ -6,8 +6,8 @@ from ..terms.effects import traits
 from . import verification
 from .baseline import as_given
 from .contest import Contest
-from .evidence import Motion
 from .findings import Findings, Solution, alone
+from .motion import Motion
 from .naming import Named, search
 from .problem import ALIGNED, Problem, across_reversals, problem_of
 from .timing import late, overlooked, with_late_force

@@ -17,8 +17,9 @@ from ..terms.effect import Effect
 from ..terms.effects import EFFECTS, traits
 from .candidates import Candidate
 from .contest import RIVAL, Trial
-from .evidence import Motion, gather, motion_of
+from .evidence import gather
 from .findings import Findings, Solution
+from .motion import Motion, motion_of
 from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .problem import Problem

@@ -9,7 +9,8 @@ from ...data.recording import Recording
 from ...models import Model
 from ...simulators import AbstractSimulator
 from ...terms import KNOWN_FORCE
-from ..evidence import Evidence, gather, motion_of
+from ..evidence import Evidence, gather
+from ..motion import motion_of
 from ..naming import LINEARITY
 from ..regression import RANK, orthonormal
 from ..significance import blocks

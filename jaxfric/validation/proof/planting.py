@@ -18,7 +18,7 @@ import numpy as np
 from ... import signals
 from ...data.io import read, write_text
 from ...data.recording import Recording
-from ...explanation.evidence import from_position
+from ...explanation.motion import from_position
 from ...identification.documents import to_json
 from ...identification.identifying import identify
 from ..concealed.kinds import kind, names

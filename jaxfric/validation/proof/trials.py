@@ -13,8 +13,9 @@ import numpy as np
 from ...data.io import write_text
 from ...data.recording import Recording
 from ...explanation import Explanation, explain
-from ...explanation.evidence import gather, motion_of
+from ...explanation.evidence import gather
 from ...explanation.forward import motion_error
+from ...explanation.motion import motion_of
 from ...explanation.problem import across_reversals, problem_of, with_holdout
 from ...explanation.verification import residual
 from ...identification.documents import to_json

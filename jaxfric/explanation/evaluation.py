@@ -1,0 +1,94 @@
+"""Columns of a term at the nodes of a recording, compiled once for each kind of term."""
+
+import copy
+import dataclasses
+import operator
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from .. import programs
+from ..data.recording import Recording
+from ..terms import KNOWN
+from ..terms.base import AbstractTerm
+
+# Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
+# neighbour that gives its derivative; of a load that is stepped along the motion many at once, as
+# four times as many steps side by side take hardly longer.
+BATCH, PAIR, STEPPED = 8, 2, 32
+
+
+def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
+    """Columns, `(B, p, M)`, and momentum, `None` where there is none, at β, `(B, d)`.
+
+    Compiled once for each kind of term and each of the few B: numbers of the recording that are
+    built into a term's structure (the middle of the stroke, say) go in as data.
+    """
+    numbers: list[float] = []
+
+    def take(number: float) -> float:
+        numbers.append(number)
+        return 1.0
+
+    form = _renumbered(term, take)
+    motion = without_known(motion, term.coordinates)
+    return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
+
+
+def without_known(motion: Recording, kept: frozenset[str] = frozenset()) -> Recording:
+    """A motion without what a simulator says of it, for which nothing is to be compiled anew."""
+    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN) or k in kept}
+    if len(channels) == len(motion.channels):
+        return motion
+    return dataclasses.replace(motion, channels=channels)
+
+
+def _columns(form, betas, numbers, motion):
+    def one(beta):
+        inside = iter(numbers)
+        known = _renumbered(form.with_beta(beta), lambda _: next(inside))
+        return known.columns(motion).T, known.momentum(motion).T if form.inertial else None
+
+    if form.nonlinear:
+        return jax.vmap(one)(betas)
+    alone = one(betas[0])
+    return jax.tree.map(lambda x: jnp.broadcast_to(x[None], (len(betas), *x.shape)), alone)
+
+
+_compiled = programs.compiled(_columns, optimised=programs.LITTLE)
+
+
+def _renumbered(part: Any, number: Callable[[float], Any]) -> Any:
+    """A term whose static floating-point numbers, however deep, are replaced; but zeros, which are
+    another form of the law, stay.
+    """
+    if isinstance(part, float) and part != 0:
+        return number(part)
+    if isinstance(part, tuple):
+        parts = tuple(_renumbered(each, number) for each in part)
+        return part if all(map(operator.is_, parts, part)) else parts
+    if not isinstance(part, AbstractTerm):
+        return part
+    changed = {}
+    for name, value in vars(part).items():
+        if name in _static(type(part)) or isinstance(value, tuple | AbstractTerm):
+            new = _renumbered(value, number)
+            if new is not value:
+                changed[name] = new
+    if not changed:
+        return part
+    other = copy.copy(part)
+    for name, value in changed.items():
+        object.__setattr__(other, name, value)
+    return other
+
+
+@cache
+def _static(kind: type) -> frozenset[str]:
+    """The names of a term's fields that are part of its structure."""
+    fields = dataclasses.fields(kind)
+    return frozenset(field.name for field in fields if field.metadata.get("static"))

@@ -1,0 +1,65 @@
+"""A recording whose velocity has been derived, once for all the rows that are made of it."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from .. import signals
+from ..data.recording import Recording, pad
+from .evaluation import without_known
+
+
+class Motion(NamedTuple):
+    """A recording whose velocity has been derived, once for all the rows that are made of it.
+
+    `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
+    few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
+    `signals.smoothing`.
+    """
+
+    recording: Recording
+    padded: Recording
+    smoothed: float
+
+    def forced(self, force: Any) -> "Motion":
+        """The same motion with another force, N, `(N,)`."""
+        other = dataclasses.replace(self.recording, force=jnp.asarray(force))
+        longer = pad(other, self.padded.num_samples).force
+        return self._replace(recording=other, padded=dataclasses.replace(self.padded, force=longer))
+
+
+def motion_of(recording: "Recording | Motion") -> Motion:
+    """The motion of a recording by its position, where it has one.
+
+    A recorded velocity is late by its filter, which would look like a delay of the force.
+    """
+    if isinstance(recording, Motion):
+        return recording
+    return derived(from_position(recording))
+
+
+def from_position(recording: Recording) -> Recording:
+    """A recording without its velocity, where it has a position to derive one from."""
+    if recording.position is None:
+        return recording
+    return dataclasses.replace(recording, velocity=None)
+
+
+def derived(recording: Recording) -> Motion:
+    """The motion of a recording by its velocity, where it has one."""
+    # The name and the number of segments would be compiled in.
+    nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
+    bare = without_known(nameless)
+    padded, whole = (pad(log, padded_length(recording.num_samples)) for log in (bare, nameless))
+    smoothed = 0.0
+    if padded.velocity is None:
+        choice = signals.choose(padded)
+        padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
+    return Motion(recording, dataclasses.replace(padded, channels=whole.channels), smoothed)
+
+
+def padded_length(count: int) -> int:
+    """The next power of two, or three quarters of it, so that few programs are compiled."""
+    octave = max(256, 1 << (count - 1).bit_length())
+    return octave if count > octave * 3 // 4 else octave * 3 // 4

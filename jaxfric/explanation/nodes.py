@@ -1,0 +1,129 @@
+"""Nodes: local means of a recording, a sixth of the kernel apart, and their weights in rows."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from .. import signals
+from ..data.recording import Recording
+from ..terms import KNOWN_FORCE, KNOWN_REST
+from ..terms.sample import Scales
+from .motion import padded_length
+
+# Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
+# which is below 1e-4 of its peak.
+NODES = 6
+# Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
+STRIDE = 3
+
+
+def node_signals(
+    recording: Recording, limits: Scales, step: int, delay: float, smoothed: float
+) -> dict:
+    """Local means of every signal, `step` samples apart, with the run that each node lies in.
+
+    `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
+    """
+    time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
+    linked = _continuous(time, mask, np.asarray(recording.segment), limits.interval)
+    run = np.pad(np.cumsum(~linked), (1, 0))
+    steps = np.where(linked, np.diff(time), limits.interval)
+    series = {
+        "time": time,
+        "force": np.asarray(recording.force, float),
+        "velocity": np.asarray(recording.velocity, float),
+        "elapsed": np.pad(np.cumsum(steps), (1, 0)),
+    }
+    if recording.position is not None:
+        series["position"] = np.asarray(recording.position, float)
+    series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
+    if delay:
+        series["force"] = _shifted(time, series["force"], run, delay)
+    centres = np.arange(0, len(time), step)
+    offsets = np.arange(-(step - 1), step)
+    at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
+    near = mask[at] & (run[at] == run[centres][:, None])
+    near &= centres[:, None] + offsets[None, :] == at
+    weight = np.where(near, (step - np.abs(offsets))[None, :], 0.0)
+    total = weight.sum(axis=1)
+    weight /= np.where(total > 0, total, 1.0)[:, None]
+    means = {
+        name: np.einsum("ij,ij->i", weight, np.where(near, values[at], 0.0))
+        for name, values in series.items()
+    }
+    label = np.where(total > 0, run[centres], -1 - np.arange(len(centres)))
+    # Terms are functions of the motion at an instant, not of its mean: the curvature that the
+    # triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
+    # and the columns' weights take it off again, so that force and columns are averaged alike. So
+    # is what the derivative took off the velocity, which would look like a load on a spring.
+    inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
+    forces = {"force", f"channel {KNOWN_FORCE}", f"channel {KNOWN_REST}"}
+    for name in set(means) - forces - {"time", "elapsed"}:
+        values = means[name]
+        bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
+        means[name] = values.copy()
+        derived = name == "velocity" or name.endswith("momentum")
+        lost = 1 / 12 + (smoothed / step**2 if derived else 0.0)
+        means[name][inner] -= lost * bend
+    return means | {"run": label}
+
+
+def _continuous(time, mask, segment, interval) -> np.ndarray:
+    """As [`continuous`][jaxfric.signals.continuous], on the host."""
+    steps = np.diff(time)
+    together = mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
+    return together & (steps > 0) & (steps <= signals.GAP_FACTOR * interval)
+
+
+def _shifted(time, force, run, delay):
+    """The force `delay` later, s: u(t + delay), inside each run."""
+    late = np.interp(time + delay, time, force) if np.all(np.diff(time) > 0) else None
+    if late is not None:
+        return late
+    out = np.empty_like(force)
+    for label in np.unique(run):
+        own = run == label
+        out[own] = np.interp(time[own] + delay, time[own], force[own])
+    return out
+
+
+def windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
+    """Nodes of the row around every third node, whether they lie in one run, and their weights."""
+    middle = np.arange(NODES, len(parts["time"]) - NODES, STRIDE)
+    index = middle[:, None] + np.arange(-NODES, NODES + 1)[None, :]
+    whole = parts["run"][index[:, 0]] == parts["run"][index[:, -1]]
+    even = np.arange(-NODES, NODES + 1) * reach / NODES
+    offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
+    offset = np.where(whole[:, None], offset, even[None, :])
+    tau = offset / reach
+    average = np.maximum(1 - tau**2, 0.0) ** 4
+    slope = 8 * tau * np.maximum(1 - tau**2, 0.0) ** 3
+    average /= average.sum(axis=1, keepdims=True)
+    slope -= average * slope.sum(axis=1, keepdims=True)
+    slope /= np.sum(slope * offset, axis=1, keepdims=True)
+    return index, whole, average, slope
+
+
+def averaged(weights: np.ndarray) -> np.ndarray:
+    """The weights of a triangle's mean around each node, by its second moment."""
+    bend = np.zeros_like(weights)
+    bend[:, 1:-1] = weights[:, 2:] - 2 * weights[:, 1:-1] + weights[:, :-2]
+    bend[:, 0], bend[:, -1] = weights[:, 1], weights[:, -2]
+    return weights + bend / 12
+
+
+def padded(parts: dict, recording: Recording) -> Recording:
+    """The nodes as a recording, lengthened as `padded_length` says."""
+    count = len(parts["time"])
+    length = padded_length(count)
+
+    def pad(values):
+        return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))
+
+    position = pad(parts["position"]) if "position" in parts else None
+    channels = {k[8:]: pad(v) for k, v in parts.items() if k.startswith("channel ")}
+    labels = np.unique(parts["run"], return_inverse=True)[1].astype(np.int32)
+    segment = jnp.asarray(np.pad(labels, (0, length - count), mode="edge"))
+    return Recording(
+        pad(parts["time"]), pad(parts["force"]), position, pad(parts["velocity"]),
+        segment=segment, channels=channels, num_segments=1, units=recording.units,
+    )  # fmt: skip
