@@ -21,7 +21,7 @@ from .naming import Named
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .uncertainty import estimated
-from .verdict import rough, stand_ins, verdict_of
+from .verdict import beside_rows, rough, stand_ins, verdict_of
 
 
 def summarise(
@@ -58,7 +58,7 @@ def summarise(
     errors = document(better, filtered, models[1], figures)
     remarks = [*remarks, *_elsewhere(errors)]
     new, later = ([s for s in some if s.coordinate not in known.left] for some in (before, after))
-    much = rough(filtered, shares) and not known.rough
+    much = (rough(filtered, shares) or beside_rows(errors)) and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     return Explanation(

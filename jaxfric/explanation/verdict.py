@@ -8,7 +8,7 @@ import numpy as np
 from ..checks import Remark
 from ..terms.effects import EFFECTS
 from .doubts import NOT_BETTER
-from .explained import Finding
+from .explained import LARGE, Finding
 from .naming import LINEARITY
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
@@ -48,6 +48,15 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     many = any(left(view) > HALF**2 and above(view, HALF_ROUGH) for view in much)
     many |= here["after"] > max(halfway, LINEARITY)
     return bool(above(here, ROUGH) or (shares and (many or far)))
+
+
+def beside_rows(fit: Mapping[str, Any]) -> bool:
+    """Whether much of the force is left, sample by sample, that noise does not make.
+
+    The rows hold neither standstill nor what is beside it. A tenth of the force's power there is
+    not nothing, though no row shows it.
+    """
+    return fit["force_error"]["after"] ** 2 - fit["noise_floor"] ** 2 > LARGE**2
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of

@@ -17,6 +17,7 @@ from ...simulators import AbstractSimulator, Attribute, Mujoco
 from ..explained import Explanation, Finding
 from ..figures import Figures, cast
 from . import limits, wiring
+from .contact import Contact, contacts
 from .faults import Faults, Seen, find, put_right
 from .rows import Part, Rows, rows_of
 from .table import Check, checks_of
@@ -29,9 +30,10 @@ class Looked(AbstractSimulator):
     """A simulator whose log has been looked at: what is put right, and the table."""
 
     def __init__(self, part: Part, raw: Part, faults: Faults, limit: Estimate | None,
-                 checks: list[Check], power: tuple[float, float]):  # fmt: skip
+                 blocked: Sequence[Contact], checks: list[Check],
+                 power: tuple[float, float]):  # fmt: skip
         self.part, self.raw, self.faults, self.limit = part, raw, faults, limit
-        self.checks, self.power = checks, power
+        self.blocked, self.checks, self.power = blocked, checks, power
 
     def baseline(self, units):
         return self.part.simulator.baseline(units)
@@ -45,7 +47,9 @@ class Looked(AbstractSimulator):
     def standing_on(self, simulator: AbstractSimulator) -> "Looked":
         """The same of a simulator some of whose values have been put right since."""
         part = self.part._replace(simulator=simulator)
-        return Looked(part, self.raw, self.faults, self.limit, self.checks, self.power)
+        return Looked(
+            part, self.raw, self.faults, self.limit, self.blocked, self.checks, self.power
+        )
 
     def logs(self, recording: Recording, holdout: Recording | None):
         """The recordings as they were put right, in the caller's precision."""
@@ -66,7 +70,7 @@ class Looked(AbstractSimulator):
     @property
     def changed(self) -> bool:
         """Whether anything was put right."""
-        return bool(self.faults.zeros or self.faults.clock or self.limit)
+        return bool(self.faults.zeros or self.faults.clock or self.limit or self.blocked)
 
     @property
     def wrong(self) -> str | None:
@@ -81,15 +85,18 @@ def look(parts: Sequence[Part]) -> list[Looked]:
     """
     with jax.enable_x64(True):
         parts = [_cast(part) for part in parts]
+        blocked = [contacts(part.simulator.beside(part.recording)) for part in parts]
+        parts = [_apart(*each) for each in zip(parts, blocked, strict=True)]
         raw = [_rows(part) for part in parts]
         wired = wiring.look(parts, raw)
         bounds = [_limit(part) for part in parts]
         clipped = [_arrived(part, bound) for part, bound in zip(parts, bounds, strict=True)]
         able = not wired.said or not wired.everywhere
         seen = find(clipped) if able else Seen(Faults(), {}, (), raw)
+        ends = zip(bounds, blocked, strict=True)
         return [
             _looked(*each, seen, wired)
-            for each in zip(parts, clipped, raw, seen.rows, bounds, strict=True)
+            for each in zip(parts, clipped, raw, seen.rows, ends, strict=True)
         ]
 
 
@@ -113,6 +120,14 @@ def _sound(recording: Recording) -> Recording:
     return dataclasses.replace(cast(recording), mask=jnp.asarray(mask))
 
 
+def _apart(part: Part, blocked: Sequence[Contact]) -> Part:
+    """Without the samples in which something blocks the axis: there nothing is compared."""
+    for contact in blocked:
+        held = None if part.holdout is None else contact.without(part.holdout)
+        part = part._replace(recording=contact.without(part.recording), holdout=held)
+    return part
+
+
 def _rows(part: Part) -> Rows:
     log = part.simulator.beside(part.recording)
     return rows_of(log, part.simulator.baseline(log.units))
@@ -128,16 +143,17 @@ def _arrived(part: Part, bound: Estimate | None) -> Part:
 
 
 def _looked(
-    raw: Part, clipped: Part, before: Rows, after: Rows, bound: Estimate | None, seen: Seen, wired
-) -> Looked:
-    faults = seen.faults
+    raw: Part, clipped: Part, before: Rows, after: Rows,
+    ends: tuple[Estimate | None, Sequence[Contact]], seen: Seen, wired,
+) -> Looked:  # fmt: skip
+    faults, (bound, blocked) = seen.faults, ends
     simulator = clipped.simulator
     if any(faults.zeros.values()) and isinstance(simulator, Mujoco):
         simulator = simulator.with_zeros(faults.zeros)
     held = None if clipped.holdout is None else put_right(clipped.holdout, faults)
     part = Part(put_right(clipped.recording, faults), held, simulator, clipped.name)
-    table = checks_of(raw, seen, bound, wired)
-    return Looked(part, raw, faults, bound, table, (before.power, after.power))
+    table = checks_of(raw, seen, bound, blocked, wired)
+    return Looked(part, raw, faults, bound, blocked, table, (before.power, after.power))
 
 
 def told(found: Explanation, looked: Looked, x64: bool) -> Explanation:
@@ -151,7 +167,8 @@ def told(found: Explanation, looked: Looked, x64: bool) -> Explanation:
     part = after / before if before > 0 else 1.0
     others = [f._replace(share=f.share * part) for f in found.findings]
     pictures = [None] * len(findings) + list(found.curves.get("findings", ()))
-    verdict = "explained" if found.verdict == "consistent" else found.verdict
+    verdicts = {"consistent": "explained", "unexplained": "partly_explained"}
+    verdict = verdicts.get(found.verdict, found.verdict)
     return dataclasses.replace(
         found,
         findings=[*findings, *others],
@@ -190,12 +207,16 @@ def _findings(looked: Looked) -> list[Finding]:
         if not check.wrong or check.effect not in _EQUATIONS:
             continue
         value = check.value
-        p_value = math.erfc(abs(float(value.value) / float(value.standard_error)) / math.sqrt(2))
+        part = share if check.share is None else check.share
+        # Where something blocks the axis noise has no say.
+        sure = check.share is not None
+        away = math.inf if sure else abs(float(value.value) / float(value.standard_error))
+        p_value = math.erfc(away / math.sqrt(2))
         found.append(
             Finding(
-                check.effect, _EQUATIONS[check.effect], f"{check.text} {share:.0%} of the "
+                check.effect, _EQUATIONS[check.effect], f"{check.text} {part:.0%} of the "
                 "unexplained force goes with it.", check.confusable, check.separate_by,
-                {check.parameter: value}, share, None, p_value, attribute=check.attribute,
+                {check.parameter: value}, part, None, p_value, attribute=check.attribute,
             )
         )  # fmt: skip
     return found
@@ -205,4 +226,5 @@ _EQUATIONS = {
     "position_zero": "f(q − z)",
     "clock": "u(t) = f(t − τ)",
     "force_limit": "u_real = clip(u, ±U)",
+    "end_stop": "x ≤ x_s, or x ≥ x_s",
 }

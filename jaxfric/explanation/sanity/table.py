@@ -1,6 +1,6 @@
 """The rows of the table of sanity, each in its own words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ from ...identification.uncertainty import Estimate
 from ...simulators import Mujoco
 from ..quantities import quantity
 from . import limits
+from .contact import Contact
 from .faults import DRIFT, OFFSET, ZERO, Seen
 from .rows import Part
 from .wiring import Wiring
@@ -22,7 +23,8 @@ class Check(NamedTuple):
 
     - `effect`: its public name; `text`: what there is to say; `wrong`, and whether nothing can be
       named beside it, `severe`.
-    - `value` where it is one, as the `parameter`; `attribute`, the simulator's own name.
+    - `value` where it is one, as the `parameter`; `attribute`, the simulator's own name; `share`,
+      of the mismatch, where it is this one's alone.
     """
 
     effect: str
@@ -34,6 +36,7 @@ class Check(NamedTuple):
     attribute: str | None = None
     confusable: tuple[str, ...] = ()
     separate_by: str = ""
+    share: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The row as plain data."""
@@ -52,7 +55,9 @@ def _plain(number) -> float | None:
     return float(number) if np.isfinite(number) else None
 
 
-def checks_of(part: Part, seen: Seen, bound: Estimate | None, wired: Wiring) -> list[Check]:
+def checks_of(
+    part: Part, seen: Seen, bound: Estimate | None, blocked: Sequence[Contact], wired: Wiring
+) -> list[Check]:
     """The table of one joint."""
     return [
         _wiring(part, wired.said, wired.everywhere),
@@ -60,6 +65,7 @@ def checks_of(part: Part, seen: Seen, bound: Estimate | None, wired: Wiring) -> 
         *_zeros(part, seen),
         _clock(part, seen),
         _limit(part, bound),
+        *map(_blocked, blocked),
         *_ends(part),
     ]
 
@@ -168,6 +174,22 @@ def _limit(part: Part, bound: Estimate | None) -> Check:
     )
     attribute = f"joint/{part.name}/actuatorfrcrange" if part.name else None
     return Check("force_limit", text, True, False, bound, "force_limit", attribute)
+
+
+def _blocked(contact: Contact) -> Check:
+    """Where something that the simulator lacks blocks the axis."""
+    side = "upper" if contact.upper else "lower"
+    name = "stop_position" if contact.upper else "lower_stop_position"
+    text = (
+        f"At {quantity(contact.place)}, the {side} end of the stroke, something blocks the axis: "
+        f"it holds up to {contact.held:.3g} {contact.unit}, more than friction can. It is a limit of "
+        f"the joint or a contact that the simulator lacks. {contact.samples} samples lie beyond; "
+        "nothing is compared there, nor do the errors count them."
+    )
+    apart = "Look at the machine there: does it touch its own end, or something beside it?"
+    return Check(
+        "end_stop", text, True, False, contact.place, name, separate_by=apart, share=contact.share
+    )
 
 
 def _ends(part: Part) -> list[Check]:
