@@ -182,9 +182,9 @@ def _blocked(contact: Contact) -> Check:
     name = "stop_position" if contact.upper else "lower_stop_position"
     text = (
         f"At {quantity(contact.place)}, the {side} end of the stroke, something blocks the axis: "
-        f"it holds up to {contact.held:.3g} {contact.unit}, more than friction can. It is a limit of "
-        f"the joint or a contact that the simulator lacks. {contact.samples} samples lie beyond; "
-        "nothing is compared there, nor do the errors count them."
+        f"it holds up to {contact.held:.3g} {contact.unit}, more than friction can. It is a limit "
+        f"of the joint or a contact that the simulator lacks. {contact.samples} samples lie "
+        "beyond; nothing is compared there, nor do the errors count them."
     )
     apart = "Look at the machine there: does it touch its own end, or something beside it?"
     return Check(
