@@ -4,8 +4,9 @@
 
 Axes are drawn with one effect and recorded along an unlucky motion: part of the stroke, one speed.
 Where this recording does not tell the true effect from others (`decide`), that is a case. Then the
-axis is recorded once more: along the motion of `design.separate`, along the first motion again, and
-along a plain sine within the limits of the design; `decide` says which effect each speaks for.
+axis is recorded once more: along the motion of `separation.separate`, along a plain sine within
+the same limits, and along the first motion again, with the noise of the first recording, three
+and ten times it; `decide` says which effect each speaks for.
 """
 
 import argparse
@@ -19,14 +20,17 @@ import numpy as np
 
 import jaxfric as jf
 from jaxfric.identification.deciding import decide, shapes
-from jaxfric.identification.design import separate
 from jaxfric.identification.motion import Limits, multisine, sine
+from jaxfric.identification.separation import separate
 from jaxfric.terms.effects import EFFECTS as CATALOGUE
 
 jax.config.update("jax_enable_x64", True)
 LIMITS = Limits(0.1, 0.15, 2.0, 60.0, 12.0, 0.004)
 MASS, BANDWIDTH = 4.0, 60.0
-FRESH = 4
+# White noise of the force, parts of its own spread: of the first recording, and of the second.
+NOISE, NOISES = 0.02, (0.02, 0.06, 0.2)
+KINDS = ("designed", "sine", "repeated")
+FRESH = 12
 EFFECTS = (
     "spring", "hardening_spring", "gravity_unbalance", "cogging", "periodic_disturbance",
     "position_dependent_friction", "sticky_spot", "end_stop",
@@ -98,20 +102,25 @@ def unlucky(rng, effect):
     return jf.Recording(t, 0 * t, position=x)
 
 
-def recorded(model, reference, seed):
-    """The axis in closed loop, with encoder and noise, the force centred on its sample."""
+def recorded(model, reference, seed, noises=(NOISE,)):
+    """The axis in closed loop with an encoder, once for each noise of the force, which is centred
+    on its sample.
+    """
     loop = jf.PD(kp=MASS * BANDWIDTH**2, kd=2 * MASS * BANDWIDTH)
     run = jf.simulate(
         model, reference, loop, encoder=jf.Encoder(2e-7), substeps=2, key=jax.random.key(seed)
     )
     force = np.asarray(run.force)
     centred = 0.5 * (force + np.concatenate([force[:1], force[:-1]]))
-    noise = 0.02 * np.std(force) * np.random.default_rng(seed).normal(size=force.size)
+    white = np.std(force) * np.random.default_rng(seed).normal(size=force.size)
     # What the loop needs to settle is left out.
     kept = slice(25, None)
-    return jf.Recording(
-        run.time[kept], jnp.asarray(centred + noise)[kept], position=run.position[kept]
-    )
+    return [
+        jf.Recording(
+            run.time[kept], jnp.asarray(centred + noise * white)[kept], position=run.position[kept]
+        )
+        for noise in noises
+    ]
 
 
 def along(motion):
@@ -125,7 +134,7 @@ def case(seed, effects=EFFECTS):
     effect = effects[int(rng.integers(len(effects)))]
     model = machine(rng, effect)
     first = unlucky(rng, effect)
-    log = recorded(model, first, seed)
+    (log,) = recorded(model, first, seed)
     scales = jf.signals.scales(jf.signals.prepare(log))
     others = [r for r in CATALOGUE[effect].confusable_with if shapes(r, scales)]
     improved = jf.models.coulomb_viscous() + shapes(effect, scales)[0]
@@ -139,37 +148,49 @@ def case(seed, effects=EFFECTS):
     term = jf.models.coulomb_viscous() + shapes(said.effect, scales)[0]
     told = jf.identify(term, log).model
     start = time.perf_counter()
-    plan = separate(told, {said.effect: rivals}, LIMITS, steps=40)
+    plan = separate(told, {said.effect: rivals}, LIMITS)
     found["design_seconds"] = time.perf_counter() - start
-    found["separation"] = plan.separation
+    found["enough"] = plan.enough
+    found["apart"] = [each._asdict() for each in plan.apart if effect in (each.true, each.other)]
     motions = {
         "designed": along(plan.motion),
-        "repeated": first,
         "sine": along(multisine(sine(LIMITS), LIMITS)),
+        "repeated": first,
     }
     for number, (kind, reference) in enumerate(motions.items()):
-        log = recorded(model, reference, seed + 1_000_003 * (number + 1))
-        verdict = decide(told, said.effect, rivals, log)
-        found[kind] = {
-            "effect": verdict.effect, "decided": verdict.decided,
-            "right": verdict.effect == effect,
-            "above": {each.effect: round(each.above, 1) for each in verdict.standings},
-        }  # fmt: skip
+        noises = NOISES[:1] if kind == "repeated" else NOISES
+        logs = recorded(model, reference, seed + 1_000_003 * (number + 1), noises)
+        found[kind] = [said_of(decide(told, said.effect, rivals, log), effect) for log in logs]
     return found
 
 
+def said_of(verdict, effect):
+    """A decision as plain data; how far the best of the wrong effects is from the best of all."""
+    wrong = [each.above for each in verdict.standings if each.effect != effect]
+    return {
+        "effect": verdict.effect, "decided": verdict.decided, "right": verdict.effect == effect,
+        "margin": min(wrong),
+        "above": {each.effect: round(each.above, 1) for each in verdict.standings},
+    }  # fmt: skip
+
+
 def summary(cases):
-    """Counts over the cases: rightly and wrongly decided, not decided, best right."""
-    rows = {}
-    for kind in ("designed", "repeated", "sine"):
-        said = [c[kind] for c in cases]
-        rows[kind] = {
-            "decided rightly": sum(s["decided"] and s["right"] for s in said),
-            "decided wrongly": sum(s["decided"] and not s["right"] for s in said),
-            "not decided": sum(not s["decided"] for s in said),
-            "least error right": sum(s["right"] for s in said),
-        }
-    return rows
+    """For each noise and motion: counts over the cases, and quartiles of the margin."""
+    return {f"noise {noise:.0%}": {
+        kind: _counts([case[kind][i] for case in cases if i < len(case[kind])])
+        for kind in KINDS
+    } for i, noise in enumerate(NOISES)}  # fmt: skip
+
+
+def _counts(said):
+    margins = [s["margin"] if s["right"] else 0.0 for s in said] or [0.0]
+    return {
+        "decided rightly": sum(s["decided"] and s["right"] for s in said),
+        "decided wrongly": sum(s["decided"] and not s["right"] for s in said),
+        "not decided": sum(not s["decided"] for s in said),
+        "least error right": sum(s["right"] for s in said),
+        "margin": [round(float(x), 1) for x in np.percentile(margins, (25, 50, 75))],
+    }
 
 
 def main():
@@ -193,16 +214,18 @@ def main():
         seed += 1
         short = {k: v for k, v in one.items() if k in ("seed", "true", "named", "rivals", "error")}
         ways = {
-            k: (one[k]["effect"], one[k]["decided"])
-            for k in ("designed", "repeated", "sine")
+            k: [(said["effect"], said["decided"], round(said["margin"], 1)) for said in one[k]]
+            for k in KINDS
             if k in one
         }
         print(json.dumps(short | ways), flush=True)
         cases = [c for c in seen if c["case"] and "designed" in c]
         arguments.out.write_text(json.dumps({"summary": summary(cases), "cases": seen}, indent=1))
     print(f"{len(seen)} axes drawn, {len(cases)} confusable cases")
-    for kind, row in summary(cases).items():
-        print(f"{kind:9}", row)
+    for noise, rows in summary(cases).items():
+        print(noise)
+        for kind, row in rows.items():
+            print(f"  {kind:9}", row)
 
 
 if __name__ == "__main__":

@@ -160,8 +160,8 @@ def least_mean_squares(record, step=0.01):
 def sequential(record):
     """Coulomb friction first, from the slow fifth of the speeds; then viscous from what is left.
 
-    After the title and the abstract of Elhami & Brookfield (1997); their estimator is not restated.
-    The mass is told.
+    What the title of Elhami & Brookfield (1997) says, in a form of ours: neither paper nor its
+    abstract was at hand. The mass is told.
     """
     design = columns(record.velocity)
     target = _slipping(design, record.force - record.mass * record.smooth)[0]
@@ -176,8 +176,8 @@ def sequential(record):
 def frequency_domain(record):
     """The equation's mean and first harmonics over whole periods; −(kω)² X_k is the acceleration.
 
-    After the title and the abstract of Kim & Ha (2001), whose weighting and proof of convergence
-    are not restated. NaN without a whole period. Mass fitted.
+    What the title of Kim & Ha (2001) says, in a form of ours: neither their paper nor its abstract
+    was at hand. NaN without a whole period. Mass fitted.
     """
     whole = (len(record.force) - 1) // record.period * record.period
     if not whole:

@@ -77,3 +77,11 @@ def test_a_recording_without_a_dwell_says_so():
     test = breakaway(recording, jf.identify("coulomb-viscous", recording))
     assert not test.levels and "dwell" in test.why and "dwell" in repr(test)
     assert sentence(test, {"force": "N", "position": "m"}) == ""
+
+
+@pytest.mark.slow
+def test_a_level_that_may_be_zero_is_none(data_folder):
+    """The servo is off within the noise of its force: a level there would be under its friction."""
+    servo = jf.read(data_folder / "delta_servo" / "S1_1.csv")
+    test = breakaway(servo, jf.identify("gaussian", servo))
+    assert not test.levels and "told from zero" in test.why

@@ -9,8 +9,9 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.cli import main
-from jaxfric.identification.design import columns, design, errors, separate
+from jaxfric.identification.design import columns, design, errors
 from jaxfric.identification.motion import Limits, multisine, sine
+from jaxfric.identification.separation import separate
 
 LIMITS = Limits(0.05, 0.2, 2.0, 60.0, 4.0, 0.004)
 VALUES = {
@@ -89,14 +90,52 @@ def cogging():
     return jf.models.from_parameters(model, values | wave)
 
 
-def test_rivals_are_told_apart_better():
-    model = cogging()
-    rivals = {"cogging": ["gravity_unbalance"]}
-    found = separate(model, rivals, LIMITS, steps=40)
-    assert found.separation[1] >= found.separation[0] > 0
-    assert found.rivals == ("cogging or gravity_unbalance",)
+def sprung():
+    """An axis with a spring, which part of a stroke does not tell from a stop or an unbalance."""
+    values = {"inertia": 5.0, "stiffness": 60.0}
+    values |= {f"{n}{s}": v for s in "+-" for n, v in (("coulomb", 10.0), ("viscous", 40.0))}
+    return jf.models.from_parameters(jf.models.coulomb_viscous() + jf.terms.Spring(), values)
+
+
+@pytest.fixture(scope="module")
+def separated():
+    """Without a stop's reach a term's columns are zero, where a norm has no derivative."""
+    return separate(sprung(), {"spring": ["end_stop", "hardening_spring"]}, LIMITS, steps=40)
+
+
+@pytest.mark.slow
+def test_rivals_are_told_apart_better(separated):
+    """Along a sine a spring is a mass; a third harmonic is all by which the cubes differ."""
+    apart = {(each.true, each.other): each for each in separated.apart}
+    assert len(apart) == 4
+    assert apart["spring", "hardening_spring"].before < 1e-6 < separated.enough
+    for each in apart.values():
+        assert each.after > max(1.2 * each.before, separated.enough), each
+
+
+@pytest.mark.slow
+def test_what_is_apart_is_what_the_best_imitation_leaves(separated):
+    """Beside least squares by numpy, on the designed motion as a user would fit it."""
+    motion = separated.motion
+    force = columns(jf.terms.Spring(), motion)[:, 0] * 60.0
+    sides = [np.where(np.sign(motion.velocity) == s, 1.0, 0.0) for s in (1, -1)]
+    base = [motion.acceleration, *sides, *(side * motion.velocity for side in sides)]
+    left = []
+    for centre in np.linspace(-0.05, 0.05, 24):
+        matrix = np.stack([*base, (np.asarray(motion.position) - centre) ** 3], axis=1)
+        fitted = np.linalg.lstsq(matrix, force, rcond=None)[0]
+        left.append(np.sqrt(np.mean((force - matrix @ fitted) ** 2)))
+    told = next(each for each in separated.apart if each.other == "hardening_spring")
+    assert told.after == pytest.approx(min(left), rel=1e-3)
+
+
+def test_what_no_motion_shows_is_left_out():
+    found = separate(sprung(), {"spring": ["hardening_spring", "cross_axis"]}, LIMITS, steps=1)
+    assert found.left_out == ("cross_axis",) and len(found.apart) == 2
+    with pytest.raises(ValueError, match="Hold the other axis still"):
+        separate(sprung(), {"spring": ["cross_axis"]}, LIMITS)
     with pytest.raises(ValueError, match="no term of the effect"):
-        separate(model, {"spring": ["cogging"]}, LIMITS)
+        separate(cogging(), {"spring": ["cogging"]}, LIMITS)
 
 
 def test_misuse_is_said(axis):
@@ -118,12 +157,12 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     path.write_text(json.dumps(model.to_dict()))
     assert main(["design", str(path), *ARGUMENTS, "-o", str(out), "--json", "-"]) == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["standard_errors"]["coulomb+"]["after"] > 0 and told["separation"] is None
+    assert told["standard_errors"]["coulomb+"]["after"] > 0 and told["apart"] == []
     table = np.genfromtxt(out, delimiter=",", names=True)
     assert np.max(np.abs(table["reference"])) <= 0.05 * 1.001
     findings = [{"effect": "cogging", "confusable_with": ["gravity_unbalance"]}]
     path.write_text(json.dumps({"findings": findings, "model": model.to_dict()}))
     assert main(["design", str(path), *ARGUMENTS, "-o", str(out)]) == 0
-    assert "To tell cogging or gravity_unbalance" in capsys.readouterr().out
+    assert "if it is           and not" in capsys.readouterr().out
     assert main(["design", str(path), *ARGUMENTS, "-o", str(out), "--interval", "1"]) == 2
     assert "sample faster" in capsys.readouterr().err

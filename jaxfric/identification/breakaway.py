@@ -135,7 +135,10 @@ def breakaway(recording: Recording, found: Any) -> BreakAway:
 
 def _why(seen: list) -> str:
     if seen:
-        return "no dwell ends as an axis would leave it whose friction is that of the model"
+        return (
+            "no dwell ends with a force that is told from zero, as an axis would leave it whose "
+            "friction is that of the model"
+        )
     return f"the axis never slips after a dwell of {FEWEST} samples or more"
 
 
@@ -198,13 +201,11 @@ def _transition(log, smooth, noise, mass, found, departure) -> Transition | None
     low, high = max(int(fits[0]) - 1, 0), min(int(fits[-1]) + 1, force.size - 1)
     values = force[low : high + 1]
     ends = float(values.min()) - noise, float(values.max()) + noise
-    if ends[0] <= 0 and values[-1] <= 0:
+    if ends[0] <= 0:  # a level that may be none is not told
         return None
     nearest = fits[np.argmin(np.abs(gained[fits] - 0.5 * sum(mass) * speed[-1]))]
     dwell = float(time[nearest] - time[0])
-    return Transition(
-        float(time[-1]), way, dwell, float(force[nearest]), max(ends[0], 0.0), ends[1]
-    )
+    return Transition(float(time[-1]), way, dwell, float(force[nearest]), ends[0], ends[1])
 
 
 def _curve(found: Any, way: int, fastest: float):

@@ -81,11 +81,6 @@ class ConstantVelocity(NamedTuple):
         """The points that contradict the identified curve."""
         return tuple(point for point in self.points if point.contradicts)
 
-    @property
-    def tried(self) -> bool:
-        """Whether there is any point, or a speed that was held in the mean only."""
-        return bool(self.points) or any(g.reason != NONE_THERE for g in self.not_evaluated)
-
     def to_dict(self) -> dict[str, Any]:
         """The test as plain data, SI units or those of the recording."""
         return {
@@ -294,14 +289,15 @@ def _gap(sign: int, low: float, high: float, tried: Sequence[Stretch]) -> Uneval
 
 
 def sentence(test: ConstantVelocity, units: dict[str, str]) -> str:
-    """What the test says in a line; nothing where no speed was held."""
-    if not test.tried:
+    """What the test says in a line; nothing where nothing moved."""
+    if not test.points and not test.not_evaluated:
         return ""
     speed = spell(VELOCITY, units)
     count, wrong = len(test.points), len(test.contradicted)
     if not count:
-        gap = next(g for g in test.not_evaluated if g.reason != NONE_THERE)
-        return f"Constant-velocity test: no speed could be evaluated; {gap.reason}."
+        tried = [g.reason for g in test.not_evaluated if g.reason != NONE_THERE]
+        reason = tried[0] if tried else "none was held long enough"
+        return f"Constant-velocity test: no speed could be evaluated; {reason}."
     agree = f"{count - wrong} of {count} speeds agree" if wrong else f"all {count} speeds agree"
     if count == 1:
         agree = "the one speed disagrees" if wrong else "the one speed agrees"

@@ -1,8 +1,8 @@
 """Which of several effects a recording speaks for: each in place of the others, row by row.
 
-What a second recording is made for (`design.separate`): the improved model with the found effect,
-and with each of its rivals instead, is identified from it anew; what they leave of the rows of the
-weak form is compared.
+What a second recording is made for (`separation.separate`): the improved model with the found
+effect, and with each of its rivals instead, is identified from it anew; what they leave of the rows
+of the weak form is compared.
 """
 
 from collections.abc import Sequence
@@ -84,12 +84,17 @@ def shapes(name: str, scales: Scales, log: Recording | None = None) -> list[Abst
 
 def without(model: Model, name: str, scales: Scales) -> Sum:
     """The sum of a model's terms less the last of an effect, as a structure to be fitted."""
+    place = own(model, name, scales)
+    return Sum(tuple(part for i, part in enumerate(summands(model.term)) if i != place))
+
+
+def own(model: Model, name: str, scales: Scales) -> int:
+    """The place, among a model's terms, of the last of an effect."""
     kinds = {_kind(term) for term in effect(name).shapes(scales)}
-    parts = list(summands(model.term))
-    own = [i for i, term in enumerate(parts) if _kind(term) in kinds]
-    if not own:
+    places = [i for i, term in enumerate(summands(model.term)) if _kind(term) in kinds]
+    if not places:
         raise ValueError(f"The model has no term of the effect {name!r} to tell from another.")
-    return Sum(tuple(part for i, part in enumerate(parts) if i != own[-1]))
+    return places[-1]
 
 
 def _kind(term: AbstractTerm) -> str:

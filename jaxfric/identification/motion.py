@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -9,6 +10,8 @@ from jaxtyping import Array, Float
 from ..data.recording import Recording
 
 HARMONICS = 8
+# Descents, one from near the plain sine.
+STARTS = 4
 
 
 class Limits(NamedTuple):
@@ -96,3 +99,25 @@ def descend(cost, start: Float[Array, "2 H"], steps: int, rate: float = 0.05):
     begun = (start, zero, zero, start, jnp.full((), jnp.inf, start.dtype))
     found, _ = jax.lax.scan(step, begun, jnp.arange(steps))
     return found[3], found[4]
+
+
+def search(cost, limits: Limits, steps: int, values=None) -> Float[Array, "2 H"]:
+    """The best of descents from near the plain sine and from drawn multisines, and of that sine.
+
+    **Arguments:** `cost` of coefficients, and of `values` where there are any.
+    """
+    plain = sine(limits)
+    drawn = jax.random.normal(jax.random.key(0), (STARTS, 2, HARMONICS))
+    drawn = drawn / jnp.arange(1, HARMONICS + 1, dtype=drawn.dtype)[None, None]
+    starts = jnp.concatenate([(plain + 0.02 * drawn[0])[None], drawn[1:].astype(plain.dtype)])
+
+    @eqx.filter_jit
+    def all_of(starts, plain, values):
+        def of(coefficients):
+            return cost(coefficients) if values is None else cost(coefficients, values)
+
+        found, least = jax.lax.map(lambda start: descend(of, start, steps), starts)
+        return jnp.append(found, plain[None], axis=0), jnp.append(least, of(plain))
+
+    found, least = all_of(starts, plain, values)
+    return found[int(jnp.nanargmin(least))]

@@ -82,7 +82,7 @@ def standings(document: Mapping[str, Any]) -> list[Block]:
         table.append([mark, name, str(entry["parameters"]), error, half])
     said = f"* chosen: {document['model']}"
     if len(document["tied"]) > 1:
-        said += ", the simplest of those as good as the best within one standard error (=)"
+        said += ", the simplest of those that the best does not beat significantly (=; 5 %)"
     return [Table(table, (2, 3, 4)), [said, *([document["reason"]] if document["reason"] else [])]]
 
 

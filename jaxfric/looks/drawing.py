@@ -91,8 +91,6 @@ def held(axes, test: Any) -> None:
 
     **Arguments:** `test`: its `points` and `not_evaluated`, as of `identification`.
     """
-    if not test.tried:
-        return
     for wrong, colour, name in (
         (False, "k", "at constant velocity, 95 %"),
         (True, "#c00000", "at constant velocity, contradicts"),
