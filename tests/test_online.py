@@ -193,11 +193,14 @@ def test_watch_follows_a_file(tmp_path, capsys, monkeypatch):
     assert main(["watch", str(path), "--once", "--json", "--model", "lorentzian"]) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [d["event"] for d in told].count("change") == 1
+    assert told[0]["sample_rate"] == pytest.approx(RATE) and told[0]["units"]["force"] == "N"
     last = told[-1]["parameters"]
     for name in ("coulomb+", "coulomb-", "viscous+", "viscous-"):
         assert last[name] == pytest.approx(1.15 * TRUTH[name], rel=0.05), name
     assert main(["watch", str(path), "--once", "--every", "40"]) == 0
-    assert "CHANGE" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert said.startswith(f"{path}: 500 Hz, force in N, position in m\n  Columns: time")
+    assert "CHANGE" in said
 
 
 def test_watch_says_what_is_wrong(tmp_path, capsys, monkeypatch):
@@ -211,6 +214,13 @@ def test_watch_says_what_is_wrong(tmp_path, capsys, monkeypatch):
         monkeypatch.setattr("sys.stdin", io.StringIO(text))
         assert main(["watch", "-"]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_watch_follows_text_only(tmp_path, capsys):
+    path = tmp_path / "axis.mat"
+    path.write_bytes(b"\x9c\x00\xff")
+    assert main(["watch", str(path), "--once"]) == 2
+    assert "axis.mat: byte 0 is no text" in capsys.readouterr().err
 
 
 def test_a_growing_file_is_read_line_by_line(tmp_path):

@@ -20,7 +20,13 @@ def run(arguments: Namespace) -> int:
     if arguments.file == "-":
         return _follow(sys.stdin, "standard input", arguments)
     with open(arguments.file, encoding="utf-8-sig") as file:
-        return _follow(feed.growing(file, arguments.once), arguments.file, arguments)
+        try:
+            return _follow(feed.growing(file, arguments.once), arguments.file, arguments)
+        except UnicodeDecodeError as error:
+            raise ValueError(
+                f"{arguments.file}: byte {error.start} is no text. watch follows CSV line by line; "
+                "a log of another format that is complete: jaxfric identify."
+            ) from error
 
 
 def _follow(lines, source: str, arguments: Namespace) -> int:
@@ -38,7 +44,7 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
         false_alarms=arguments.false_alarms,
     )
     told = _Told(follower, stream.units, arguments.json_lines)
-    told.begin(start)
+    told.begin(start, stream, source)
     moving: Iterator[feed.Moving] = itertools.chain(
         start.samples, feed.rest(samples, start.derivative)
     )
@@ -93,10 +99,21 @@ class _Told:
             say(text)
             sys.stdout.flush()
 
-    def begin(self, start: feed.Start) -> None:
-        speed = f"{self._units['position']}/s"
+    def begin(self, start: feed.Start, stream: feed.Feed, source: str) -> None:
+        position, force = self._units["position"], self._units["force"]
+        speed = f"{position}/s"
+        event = {
+            "event": "start",
+            "source": source,
+            "sample_rate": start.rate,
+            "slowest": start.slowest,
+            "fastest": start.fastest,
+            "units": self._units,
+        }
         self._put(
-            {"event": "start", "slowest": start.slowest, "fastest": start.fastest},
+            event,
+            f"{source}: {start.rate:.6g} Hz, force in {force}, position in {position}\n"
+            f"  {stream.served}\n"
             f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.fastest:.3g} {speed}",
         )
 

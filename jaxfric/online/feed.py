@@ -82,6 +82,7 @@ class Feed:
         chosen, scale = names.assign(header, columns, source), dict(scale or {})
         names.check_per_second(chosen, scale, source)
         self.units = names.units(chosen, scale, units or {})
+        self.served = names.served(chosen, scale, self.units)
         self._source, self._width = source, len(header)
         self._index = {
             role: (header.index(chosen[role]), scale.get(role, 1.0))
@@ -145,13 +146,14 @@ class Derivative:
 
 class Start(NamedTuple):
     """What the first samples tell: the samples themselves, with velocity; slowest and fastest
-    speed, m/s; the derivative that goes on, if there is no velocity column.
+    speed, m/s; the derivative that goes on, if there is no velocity column; the sample rate, Hz.
     """
 
     samples: list[Moving]
     slowest: float
     fastest: float
     derivative: Derivative | None
+    rate: float
 
 
 def begin(samples: Iterator[Sample], has_velocity: bool, source: str) -> Start:
@@ -175,14 +177,16 @@ def begin(samples: Iterator[Sample], has_velocity: bool, source: str) -> Start:
     if len(moving) < LEAST:
         raise ValueError(f"{source}: the clock has gaps or turns back within the first samples.")
     time, velocity, force = (np.array(x, float) for x in zip(*moving, strict=True))
-    limits = signals.scales(Recording(time, force, velocity=velocity))
+    log = Recording(time, force, velocity=velocity)
+    limits = signals.scales(log)
     slowest, fastest = float(limits.slowest), float(np.nanmax(np.abs(velocity)))
     if not 0 < slowest < fastest:
         raise ValueError(
             f"{source}: the first {len(head)} samples show no motion beyond the noise. Begin when "
             "the axis moves."
         )
-    return Start(moving, slowest, ABOVE * fastest, derivative)
+    rate = 1 / float(signals.host_interval(log))
+    return Start(moving, slowest, ABOVE * fastest, derivative, rate)
 
 
 def rest(samples: Iterator[Sample], derivative: Derivative | None) -> Iterator[Moving]:
