@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,8 @@ from .printable import short
 # Importing pyarrow takes about as long as NumPy takes for a file of this size, so smaller files
 # are quicker without it.
 _SMALL_CSV = 5_000_000  # bytes
+# Of a file so much is read for its header, and so much of its lines is held at once, bytes.
+_HEAD, _BLOCK = 65536, 1 << 24
 _DELIMITERS = ",;\t|"
 # Ten thousand columns with names of a hundred characters.
 _LONGEST_LINE = 1_000_000
@@ -108,30 +111,54 @@ def read_csv(path: Path) -> Table:
 
     **Raises:** `ValueError` if it holds no samples or its rows differ in width.
     """
-    raw = path.read_bytes()
-    end = raw.rfind(b"\n", 0, 65536) + 1
+    with path.open("rb") as file:
+        raw = file.read(_HEAD)
+    end = raw.rfind(b"\n") + 1
+    large = path.stat().st_size > _SMALL_CSV
+    if not (large and end):
+        raw = path.read_bytes()
     dialect = _dialect(_decode(raw[:end] if end else raw).splitlines(), path)
-    lines: list[str] | None = None
     notes: list[str] = []
-    if dialect.delimiter != "," and b"," in raw:  # a quoted cell with one is located as no number
-        lines = _decode(raw).splitlines()[dialect.first :]
-        decimal, notes = _signs(lines, dialect, path)
+    if dialect.delimiter != "," and _holds(path, b","):  # a quoted cell is located as no number
+        decimal, notes = _signs(_parts(path, dialect.first), dialect, path)
         dialect = dialect._replace(decimal=decimal)
     table = None
-    if len(raw) > _SMALL_CSV and dialect.delimiter and not _open_quotation(raw):
-        table = _arrow_csv(raw, dialect)
+    if large and dialect.delimiter and not _open_quotation(path):
+        table = _arrow_csv(path, dialect)
     if table is None:
-        lines = _decode(raw).splitlines()[dialect.first :] if lines is None else lines
-        table = _plain_csv(lines, dialect, path)
+        raw = path.read_bytes() if large else raw
+        table = _plain_csv(_decode(raw).splitlines()[dialect.first :], dialect, path)
     return table._replace(notes=notes + table.notes)
 
 
-def _open_quotation(raw: bytes) -> bool:
+def _blocks(path: Path) -> Iterator[bytes]:
+    """The lines of a file, some megabytes at once."""
+    with path.open("rb") as file:
+        while lines := file.readlines(_BLOCK):
+            yield b"".join(lines)
+
+
+def _holds(path: Path, character: bytes) -> bool:
+    return any(character in block for block in _blocks(path))
+
+
+def _parts(path: Path, first: int) -> Iterator[tuple[int, str]]:
+    """The lines from `first` on, many at once, with the number of the first of them."""
+    number = 0
+    for block in _blocks(path):
+        lines = _decode(block).splitlines()
+        if (skipped := max(first - number, 0)) < len(lines):
+            yield number + skipped, "\n".join(lines[skipped:])
+        number += len(lines)
+
+
+def _open_quotation(path: Path) -> bool:
     """Whether a quotation mark is open at the end of a line, where pyarrow drops the rest."""
-    return b'"' in raw and any(line.count(b'"') % 2 for line in raw.splitlines())
+    quoted = (block for block in _blocks(path) if b'"' in block)
+    return any(line.count(b'"') % 2 for block in quoted for line in block.splitlines())
 
 
-def _arrow_csv(raw: bytes, dialect: _Dialect) -> Table | None:
+def _arrow_csv(path: Path, dialect: _Dialect) -> Table | None:
     """A large file by pyarrow; `None` where that is absent or the plain reader must explain."""
     try:
         import pyarrow as pa
@@ -139,15 +166,16 @@ def _arrow_csv(raw: bytes, dialect: _Dialect) -> Table | None:
     except ImportError:
         return None
     try:
-        table = arrow_csv.read_csv(
-            pa.BufferReader(raw),
-            arrow_csv.ReadOptions(skip_rows=dialect.first, column_names=dialect.header),
-            arrow_csv.ParseOptions(delimiter=dialect.delimiter),
-            arrow_csv.ConvertOptions(decimal_point=dialect.decimal),
+        columns = arrow_columns(
+            arrow_csv.read_csv(
+                path,
+                arrow_csv.ReadOptions(skip_rows=dialect.first, column_names=dialect.header),
+                arrow_csv.ParseOptions(delimiter=dialect.delimiter),
+                arrow_csv.ConvertOptions(decimal_point=dialect.decimal),
+            )
         )
     except pa.ArrowInvalid:
         return None
-    columns = {name: arrow_column(table[name]) for name in table.column_names}
     return Table(columns, dialect.first + 1, [])
 
 
@@ -159,24 +187,30 @@ def _plain_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
     return _regular_csv(lines, dialect) or _any_csv(lines, dialect, path)
 
 
-def _signs(lines: list[str], dialect: _Dialect, path: Path) -> tuple[str, list[str]]:
+def _signs(
+    parts: Iterable[tuple[int, str]], dialect: _Dialect, path: Path
+) -> tuple[str, list[str]]:
     """The decimal sign, and a warning where each comma could as well separate thousands.
+
+    **Arguments:** `parts`, lines of the file with the number of the first of them, from 0.
 
     **Raises:** `ValueError` if commas and points are both used inside numbers: which of them is
     the decimal sign is not guessed.
     """
-    text = "\n".join(lines)
-
-    def first(number: str) -> tuple[str, str] | None:
-        """The first cell that is such a number, and its row."""
-        between = "[ \t]" if dialect.delimiter is None else f"[{re.escape(dialect.delimiter)}]"
-        found = re.search(f'(?m)(?:^|{between})[ "]*({number})[ "]*(?={between}|$)', text)
-        row = dialect.first + 1 + text.count("\n", 0, found.start(1)) if found else 0
-        return (found[1], f"row {row}") if found else None
-
-    point = first(_POINT) if "." in text else None
-    comma = first(_COMMA)
-    several = first(_SEVERAL) if re.search(r"\d[.,]\d{3}[.,]", text) else None
+    between = "[ \t]" if dialect.delimiter is None else f"[{re.escape(dialect.delimiter)}]"
+    kinds = {"point": _POINT, "comma": _COMMA, "several": _SEVERAL, "decimal": _DECIMAL}
+    found: dict[str, tuple[str, str]] = {}  # the first cell of each kind, and its row
+    for number, text in parts:
+        for kind in kinds.keys() - found.keys():
+            if kind == "point" and "." not in text:
+                continue
+            if kind == "several" and not re.search(r"\d[.,]\d{3}[.,]", text):
+                continue
+            cell = re.search(f'(?m)(?:^|{between})[ "]*({kinds[kind]})[ "]*(?={between}|$)', text)
+            if cell:
+                row = number + 1 + text.count("\n", 0, cell.start(1))
+                found[kind] = cell[1], f"row {row}"
+    point, comma, several = (found.get(kind) for kind in ("point", "comma", "several"))
     if several or (point and comma):
         cell, row = several or comma
         other = (comma if several else None) or point
@@ -185,7 +219,7 @@ def _signs(lines: list[str], dialect: _Dialect, path: Path) -> tuple[str, list[s
             f"{path}: {row}: {cell!r}{beside}: the comma may separate thousands or be the decimal "
             "sign. Write the file with one decimal sign and no separator of thousands."
         )
-    if comma and not first(_DECIMAL):
+    if comma and "decimal" not in found:
         return ",", [
             f"Warning: the comma is taken for the decimal sign ({comma[0]!r} in {comma[1]}), "
             "though every number with one could be a whole number with separated thousands; if "
@@ -277,7 +311,7 @@ def numbers(column: np.ndarray, name: str, path: Path, first_row: int) -> np.nda
     **Raises:** `ValueError` naming the file, row, column and value of the first text.
     """
     if column.dtype.kind in "biuf":
-        return column.astype(np.float64)
+        return column.astype(np.float64, copy=False)
     result = np.empty(len(column))
     for i, cell in enumerate(column):
         text = "" if cell is None else str(cell).strip()
@@ -289,6 +323,18 @@ def numbers(column: np.ndarray, name: str, path: Path, first_row: int) -> np.nda
                 "number. Correct the cell, or name another column with --columns."
             ) from None
     return result
+
+
+def arrow_columns(table: Any) -> dict[str, np.ndarray]:
+    """The columns of an Arrow table by name, each let go of once it is an array."""
+    import pyarrow as pa
+
+    columns = {}
+    for name in table.column_names:
+        columns[name] = arrow_column(table.column(0))
+        table = table.remove_column(0)
+        pa.default_memory_pool().release_unused()
+    return columns
 
 
 def arrow_column(column: Any) -> np.ndarray:

@@ -122,9 +122,10 @@ def read_with_notes(
     signals = {"time": _time(table, chosen, scale, notes, path)} | signals
     segment = table.columns[chosen["segment"]] if "segment" in chosen else None
     _check_lengths(signals, segment, chosen, source)
-    rows = np.arange(len(signals["time"])) + table.first_row
+    rows = np.arange(table.first_row, len(signals["time"]) + table.first_row, dtype=np.int32)
+    del table  # of a long log each column counts
     tidy = clean(signals, segment, rows, source, period.get("position"), repair)
-    scaled = {role: signal * scale.get(role, 1.0) for role, signal in tidy.signals.items()}
+    scaled = {r: s * scale[r] if r in scale else s for r, s in tidy.signals.items()}
     if set_point:
         scaled.setdefault("force", np.zeros_like(scaled["time"]))
         if not {"position", "velocity"} & set(scaled):
@@ -197,10 +198,11 @@ def _exact_time(time, segment, notes, source) -> np.ndarray:
     inside = np.diff(segment) == 0
     usual = np.median(np.diff(time)[inside])
     # A stamp that is rounded by 1 % of a step puts as much error on a derived velocity.
-    if np.spacing(np.abs(time).max().astype(kind)) > 0.01 * usual and time.min() != 0:
+    largest = max(abs(time.min()), abs(time.max()))
+    if np.spacing(largest.astype(kind)) > 0.01 * usual and time.min() != 0:
         notes.append(f"Time is counted from its first value, {time.min():.10g} s.")
         time = time - time.min()
-    if not np.all(np.diff(time.astype(kind))[inside] > 0):
+    if not np.all(np.diff(time.astype(kind, copy=False))[inside] > 0):
         raise ValueError(
             f"{source}: {kind.name} is too coarse for this clock. Switch on 64 bits before "
             'reading: jax.config.update("jax_enable_x64", True).'

@@ -7,7 +7,7 @@ import numpy as np
 from . import clock
 from .filtered import filtered_seams
 from .missing import missing_rows
-from .pieces import borders, note, runs
+from .pieces import borders, note, runs, some
 from .wraps import check_period, unwrap
 
 # Below this no fit of even the smallest model (three parameters a direction) has samples to spare.
@@ -42,7 +42,7 @@ def clean(
     **Raises:** `ValueError` if the clock does not run or too few valid samples are left.
     """
     notes: list[str] = []
-    segment = runs(segment) if segment is not None else np.zeros(len(rows), np.int64)
+    segment = runs(segment) if segment is not None else np.zeros(len(rows), np.int32)
     stamped = np.isfinite(signals["time"])
     if np.count_nonzero(stamped) < MIN_SAMPLES:
         raise ValueError(
@@ -71,11 +71,11 @@ def clean(
 def _in_order(signals, segment, rows, stamped, notes, source):
     """Signals, segments and rows of the samples whose time is known."""
     note(notes, ~stamped, rows, "without a time stamp left out")
-    signals = {role: signal[stamped] for role, signal in signals.items()}
-    segment, rows = runs(segment[stamped]), rows[stamped]
+    signals = {role: some(signal, stamped) for role, signal in signals.items()}
+    segment, rows = runs(some(segment, stamped)), some(rows, stamped)
     inside, segment = clock.order(signals, segment, rows, notes, source)
-    signals = {role: signal[inside] for role, signal in signals.items()}
-    return signals, runs(segment[inside]), rows[inside]
+    signals = {role: some(signal, inside) for role, signal in signals.items()}
+    return signals, runs(some(segment, inside)), some(rows, inside)
 
 
 def _with_all_stamps(signals, segment, rows, stamped, notes, source):

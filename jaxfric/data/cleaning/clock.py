@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .pieces import GAP, borders, note, runs, usual_step
+from .pieces import GAP, begun, note, runs, some, spans, usual_step
 from .steady import on_a_steady_clock
 
 # Three samples are the fewest that have a central difference, that is, a velocity.
@@ -20,15 +20,18 @@ def order(signals, segment, rows, notes, source) -> tuple[np.ndarray, np.ndarray
     usual = usual_step(time, segment)
     keep = ~_stray(time, segment, usual)
     note(notes, ~keep, rows, "with a stray time stamp left out")
-    index = np.flatnonzero(keep)
     gap, restart = _interruptions(time, segment, keep, usual)
     note(notes, restart, rows, "where the clock restarts begin a new segment")
-    segment = runs(segment + np.cumsum(restart | gap))
-    kept = {role: signal[index] for role, signal in signals.items()}
-    time = time.copy()
-    time[index] = on_a_steady_clock(kept, runs(segment[index]), notes)
+    segment = begun(segment, restart | gap)
+    kept = {role: some(signal, keep) for role, signal in signals.items()}
+    steady = on_a_steady_clock(kept, runs(some(segment, keep)), notes)
+    check_runs(steady, some(segment, keep), source)
+    if not keep.all():
+        time = time.copy()
+        time[keep] = steady
+    else:
+        time = steady
     signals["time"] = time
-    check_runs(time[index], segment[index], source)
     late = _not_late(time, segment, keep)
     note(notes, keep & ~late, rows, "with a repeated or backward time stamp left out")
     keep &= late
@@ -63,13 +66,13 @@ def check_increases(time: np.ndarray, segment: np.ndarray, rows: np.ndarray, sou
 
 def _interruptions(time, segment, keep, usual) -> tuple[np.ndarray, np.ndarray]:
     """Where a gap and where a restart of the clock begins, among the samples to keep."""
-    index = np.flatnonzero(keep)
-    step, inside = np.diff(time[index]), np.diff(segment[index]) == 0
+    kept, usual = some(time, keep), some(usual, keep)
+    step, inside = np.diff(kept), np.diff(some(segment, keep)) == 0
     gap, restart = np.zeros(len(time), bool), np.zeros(len(time), bool)
-    restart[index[1:]] = inside & (step < -GAP * usual[index][1:])
-    # After a restart another rate may hold.
-    after = usual_step(time[index], runs((segment + np.cumsum(restart))[index]))
-    gap[index[1:]] = inside & (step > GAP * after[1:])
+    restart[keep] = np.concatenate([[False], inside & (step < -GAP * usual[1:])])
+    if restart.any():  # after it another rate may hold
+        usual = usual_step(kept, runs((segment + np.cumsum(restart))[keep]))
+    gap[keep] = np.concatenate([[False], inside & (step > GAP * usual[1:])])
     return gap, restart
 
 
@@ -84,8 +87,11 @@ def _stray(time: np.ndarray, segment: np.ndarray, usual: np.ndarray) -> np.ndarr
 
 def _not_late(time: np.ndarray, segment: np.ndarray, keep: np.ndarray) -> np.ndarray:
     """Samples later than all before them in their segment."""
+    kept = some(time, keep)
+    late = np.ones(len(kept), bool)
+    for part in spans(some(segment, keep)):
+        latest = np.maximum.accumulate(kept[part])
+        late[part][1:] = kept[part][1:] > latest[:-1]
     result = np.ones(len(time), bool)
-    for part in np.split(np.flatnonzero(keep), borders(segment[keep])):
-        latest = np.maximum.accumulate(time[part])
-        result[part[1:]] = time[part[1:]] > latest[:-1]
+    result[keep] = late
     return result

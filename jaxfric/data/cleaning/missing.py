@@ -1,10 +1,14 @@
 """Rows that are lost while the clock counts on: steps that the motion around them cannot make."""
 
+from typing import NamedTuple
+
 import numpy as np
 
-from .pieces import adjacent, note, runs
+from .pieces import adjacent, begun, note
 
 MISSING_ROWS = "the position steps as if rows were missing"
+# So many steps are looked at together.
+BLOCK = 1 << 18
 # Samples on each side that say what the motion can do.
 SIDE = 3
 # How far outside of its neighbours' range a speed has to be, in widths of that range and in the
@@ -26,45 +30,72 @@ def missing_rows(signals, mask, segment, rows, notes) -> np.ndarray:
     position = signals.get("position")
     if position is None or len(position) < 4 * SIDE:
         return segment
-    step = np.diff(signals["time"])
-    speed = np.diff(position) / np.where(step > 0, step, np.inf)
     linked = adjacent(signals["time"], mask, segment)
+    speed, step = np.diff(position), np.diff(signals["time"])
+    step[step <= 0] = np.inf
+    speed /= step
+    del step
     # Per sample and per second: where the clock alone is uneven, one of them is not out.
     found = _impossible(speed, linked)
     if found.any():
         found &= _impossible(np.diff(position), linked)
-    begun = np.concatenate([[False], found])
-    if begun.any():
+    begins = np.concatenate([[False], found])
+    if begins.any():
         largest = np.max(np.abs(np.diff(position))[found])
         note(
             notes,
-            begun,
+            begins,
             rows,
             f"where {MISSING_ROWS}, by up to {largest:.4g}, which the motion around it cannot do, "
             "begin a new segment",
         )
-    return runs(segment + np.cumsum(begun))
+    return begun(segment, begins)
 
 
 def _impossible(speed: np.ndarray, linked: np.ndarray) -> np.ndarray:
     """Which steps the motion around them cannot make, shape as `speed`."""
+    found = np.zeros(len(speed), bool)
+    blocks = (_beside(speed, linked, start) for start in range(0, len(speed), BLOCK))
+    index, low, high, out, changes = map(list, zip(*blocks, strict=True))
+    index, low, high, out = map(np.concatenate, (index, low, high, out))
+    if not len(index):
+        return found
+    floor = OUT * float(np.quantile(np.concatenate(changes), USUAL, overwrite_input=True))
+    far = out > floor
+    fast = np.abs(speed[index])
+    found[index[far]] = True
+    ordinary = linked & ~found
+    least, most = (end(speed, where=ordinary, initial=0.0) for end in (np.min, np.max))
+    even = (np.sign(low) == np.sign(high)) & (high - low < 0.5 * np.abs(high + low) / 2)
+    found[index] = far & (even | (fast > 2 * max(-least, most)))
+    return found
+
+
+class _Beside(NamedTuple):
+    """The steps of a block far outside their neighbours: which, the neighbours' range, and by how
+    much they are outside; and the usual changes of speed, where the axis moves.
+    """
+
+    index: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    out: np.ndarray
+    change: np.ndarray
+
+
+def _beside(speed: np.ndarray, linked: np.ndarray, start: int) -> _Beside:
+    first = max(0, start - SIDE)
+    own = slice(start - first, start - first + BLOCK)
+    speed, linked = (values[first : start + BLOCK + SIDE] for values in (speed, linked))
     near = [_shifted(speed, k) for k in range(-SIDE, SIDE + 1) if k]
-    low, high = near[0].copy(), near[0].copy()
-    for other in near[1:]:
-        np.minimum(low, other, out=low)
-        np.maximum(high, other, out=high)
+    low, high = np.min(near, axis=0), np.max(near, axis=0)
     whole = np.convolve(linked, np.ones(2 * SIDE + 1), "same") == 2 * SIDE + 1
     whole[:SIDE], whole[len(whole) - SIDE :] = False, False
     out = np.where(whole, np.maximum(speed - high, low - speed), 0.0)
     moving = whole & ((low != 0.0) | (high != 0.0) | (speed != 0.0))
-    if not moving.any() or not np.any(out > OUT * (high - low)):
-        return np.zeros(len(speed), bool)
     change = np.abs(speed - 0.5 * (_shifted(speed, -1) + _shifted(speed, 1)))
-    floor = OUT * float(np.quantile(change[moving], USUAL))
-    far = (out > OUT * (high - low)) & (out > floor)
-    fastest = np.max(np.abs(speed[linked & ~far]), initial=0.0)
-    even = (np.sign(low) == np.sign(high)) & (high - low < 0.5 * np.abs(high + low) / 2)
-    return far & (even | (np.abs(speed) > 2 * fastest))
+    at = np.flatnonzero((out > OUT * (high - low))[own]) + own.start
+    return _Beside(at + first, low[at], high[at], out[at], change[own][moving[own]])
 
 
 def _shifted(values: np.ndarray, by: int) -> np.ndarray:

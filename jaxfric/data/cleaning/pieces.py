@@ -13,12 +13,30 @@ def runs(labels: np.ndarray) -> np.ndarray:
     same = labels[1:] == labels[:-1]
     if labels.dtype.kind == "f":
         same |= np.isnan(labels[1:]) & np.isnan(labels[:-1])
-    return np.concatenate([[0], np.cumsum(~same.astype(bool))]) if len(labels) else labels
+    numbered = np.zeros(len(labels), np.int32)
+    np.cumsum(~same.astype(bool), dtype=np.int32, out=numbered[1:])
+    return numbered
+
+
+def begun(segment: np.ndarray, begins: np.ndarray) -> np.ndarray:
+    """The segments, further ones begun at some samples."""
+    return runs(segment + np.cumsum(begins)) if begins.any() else segment
+
+
+def some(values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """The chosen values; themselves where all are, since of a long record each copy counts."""
+    return values if chosen.all() else values[chosen]
 
 
 def borders(segment: np.ndarray) -> np.ndarray:
     """Where a segment begins, but for the first."""
     return np.flatnonzero(np.diff(segment)) + 1
+
+
+def spans(segment: np.ndarray) -> list[slice]:
+    """The samples of each segment."""
+    ends = [0, *borders(segment).tolist(), len(segment)]
+    return [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
 
 
 def usual_step(time: np.ndarray, segment: np.ndarray) -> np.ndarray:
@@ -27,6 +45,9 @@ def usual_step(time: np.ndarray, segment: np.ndarray) -> np.ndarray:
     forward = (np.diff(segment) == 0) & (step > 0)
     if not forward.any():
         return np.full(len(time), np.nan)
+    if segment[-1] == 0:
+        median = np.median(some(step, forward), overwrite_input=True)
+        return np.broadcast_to(median, len(time))
     usual = np.full(int(segment[-1]) + 1, np.median(step[forward]))
     label, step = segment[1:][forward], step[forward]
     parts = np.flatnonzero(np.diff(label)) + 1

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .pieces import borders, usual_step
+from .pieces import spans, usual_step
 
 # Stamps are averaged over so many samples each way for the clock that they scatter about: it
 # follows any drift, and what is left of the scatter is an eighth.
@@ -20,21 +20,25 @@ FURTHEST = 6.0
 
 def on_a_steady_clock(signals, segment: np.ndarray, notes: list[str]) -> np.ndarray:
     """The stamps, those of a steady clock put on it; shape `(N,)`, s."""
-    time = signals["time"].copy()
-    parts = np.split(np.arange(len(time)), borders(segment))
-    late, even = np.zeros(len(time)), np.zeros(len(time), bool)
+    time = signals["time"]
+    parts, lines = spans(segment), list[tuple[slice, np.ndarray]]()
     for part in parts:
         if (line := _unrounded(time[part])) is not None:
-            late[part], even[part] = time[part] - line, True
-    if even.any():
-        time -= late
-        parts = [part for part in parts if not even[part[0]]]
-    if np.max(np.abs(late)) > NEGLIGIBLE * np.median(np.diff(time)):
-        notes.append(
-            "The time stamps are rounded, and agree to their last digit with a steady clock of "
-            f"{1 / np.median(np.diff(time)):.6g} Hz; that clock is used, which moves them by up "
-            f"to {np.max(np.abs(late)):.3g} s."
-        )
+            lines.append((part, line))
+    if lines:
+        moved = max(float(np.max(np.abs(time[part] - line))) for part, line in lines)
+        time = time.copy()
+        for part, line in lines:
+            time[part] = line
+        done = {part.start for part, _ in lines}
+        parts = [part for part in parts if part.start not in done]
+        usual = float(np.median(np.diff(time)))
+        if moved > NEGLIGIBLE * usual:
+            notes.append(
+                "The time stamps are rounded, and agree to their last digit with a steady clock "
+                f"of {1 / usual:.6g} Hz; that clock is used, which moves them by up to "
+                f"{moved:.3g} s."
+            )
     return _stamped_late(signals, time, segment, parts, notes)
 
 
@@ -50,9 +54,11 @@ def _unrounded(time: np.ndarray) -> np.ndarray | None:
     step = np.diff(time)
     if len(time) < 2 * NEAR_STAMPS or step.min() < 0 or not step.any():
         return None
+    error = 4 * np.spacing(max(abs(time[0]), abs(time[-1])))
+    if np.ptp(step) <= error:
+        return None
     digit = float(step[step > 0].min())
-    error = 4 * np.spacing(np.abs(time).max())
-    if digit < FINE * float(np.mean(step)) or np.ptp(step) <= error:
+    if digit < FINE * float(np.mean(step)):
         return None
     if np.max(np.abs(step - digit * np.rint(step / digit))) > error + 1e-6 * digit:
         return None
@@ -127,15 +133,17 @@ def _stamped_late(signals, time, segment, parts, notes) -> np.ndarray:
     be told, stamps that run back are no times of anything, and others are left alone.
     """
     name = next((role for role in ("position", "velocity") if role in signals), None)
-    if name is None or not parts:  # a reference or a force to simulate by
+    if name is None:  # a reference or a force to simulate by
         return time
-    late, steps = np.zeros(len(time)), usual_step(time, segment)
+    if all(_even(time[part]) for part in parts):
+        return time
+    late, steps = np.zeros(len(time)), usual_step(time, segment).copy()
     linked = np.zeros(len(time) - 1, bool)
     for part in parts:
         late[part], step, one = _scatter(time[part])
         if step > 0:
             steps[part] = step
-        linked[part[:-1]] = one
+        linked[part.start : part.stop - 1] = one
     if np.std(late / steps) < NEGLIGIBLE:
         return time
     share, error = _share(signals[name], late, steps, linked)
@@ -153,6 +161,14 @@ def _stamped_late(signals, time, segment, parts, notes) -> np.ndarray:
         f"{np.max(np.abs(late)):.3g} s."
     )
     return time - late
+
+
+def _even(time: np.ndarray) -> bool:
+    """Whether steps are so alike that stamps cannot scatter about their mean over a window by what
+    counts.
+    """
+    step = np.diff(time)
+    return bool(len(step)) and np.ptp(step) <= NEGLIGIBLE / (2 * NEAR_STAMPS) * np.min(step)
 
 
 def _share(signal, late, steps, linked) -> tuple[float, float]:

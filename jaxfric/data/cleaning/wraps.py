@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .pieces import adjacent, plural
+from .pieces import adjacent, plural, some
 
 # A turn counted in fewer quanta than this is a switch, not an encoder: its jumps are no seam.
 COARSEST_ENCODER = 16
@@ -37,12 +37,12 @@ def unwrap(signals, mask, segment, rows, notes, period=None, quiet=False) -> Non
     position = signals.get("position")
     if position is None or (period is None and quiet):
         return
-    index = np.flatnonzero(mask)
-    steps = _steps(signals["time"], position, mask, segment, index)
+    steps = _steps(signals["time"], position, mask, segment)
     turn = period or _turn(steps)
     if turn is None:
-        _tell(steps, rows[index[1:]], notes)
+        _tell(steps, some(rows, mask)[1:], notes)
         return
+    index = np.flatnonzero(mask)
     signals["position"] = _continuous(position, index, turn)
     changed = np.abs(signals["position"] - position)
     wraps = np.abs(np.diff(np.rint((signals["position"] - position)[index] / turn))) > 0
@@ -73,12 +73,15 @@ def check_period(position: np.ndarray, period: float, source: str) -> None:
         )
 
 
-def _steps(time, position, mask, segment, index) -> _Steps:
-    valid = position[index]
+def _steps(time, position, mask, segment) -> _Steps:
+    valid = some(position, mask)
     step = np.diff(valid)
     # The axis may have been moved while nothing was recorded, or nothing valid.
-    linked = (np.diff(index) == 1) & adjacent(time, mask, segment)[index[:-1]]
-    step = np.where(linked, step, 0.0)
+    linked = adjacent(time, mask, segment)
+    if not mask.all():
+        index = np.flatnonzero(mask)
+        linked = (np.diff(index) == 1) & linked[index[:-1]]
+    step[~linked] = 0.0
     return _Steps(valid, step, linked, np.abs(step) > 0.5 * np.ptp(valid))
 
 
