@@ -6,10 +6,16 @@ from .kinds import (
     NAMES as NAMES,
     Remark as Remark,
     none as none,
+    places as places,
     remarks as remarks,
 )
 from .recorded import LONE as LONE, lone as lone, recorded as recorded
 from .structure import hides as hides
+
+
+def cut(share: float) -> tuple[Remark, ...]:
+    """That only a share of a recording's samples is fitted, where it is below one."""
+    return () if share >= 1 else remarks(places({"excerpt": share}), {})
 
 
 def inspect(recording) -> tuple[Remark, ...]:

@@ -241,6 +241,12 @@ KINDS = (
         "The model leaves {value:.1%} of the force, and not as noise: something is missing from "
         "it, and the parameters hold a part of that. jaxfric explain says what.",
     ),
+    Kind(
+        "excerpt",
+        False,
+        "The recording is long: sixteen pieces, evenly spread over it, {value:.1%} of its samples, "
+        "are fitted. The force error is that of all samples. Cut the file to look at a part.",
+    ),
 )
 NAMES = tuple(kind.name for kind in KINDS)
 

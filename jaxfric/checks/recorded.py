@@ -102,8 +102,8 @@ def recorded(recording: Recording) -> np.ndarray:
 def lone(values: np.ndarray) -> np.ndarray:
     """Samples that no motion or actuator made: at most three in a row, far beyond all others."""
     size = np.abs(values - np.median(values))
-    ordered = np.sort(size)
-    usual = ordered[-1 - max(LONE, int(RAREST * len(ordered)))]
+    at = len(size) - 1 - max(LONE, int(RAREST * len(size)))
+    usual = np.partition(size, at)[at]
     far = (size > BEYOND * usual) & (usual > 0)
     ends = np.flatnonzero(np.diff(np.pad(far, 1).astype(np.int8)))
     for first, last in zip(ends[::2], ends[1::2], strict=True):

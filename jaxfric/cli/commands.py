@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import models as known
 from ..data import summary
+from ..data.excerpt import MOST, excerpt
 from ..data.io import read_with_notes, write_bytes, write_table, write_text
 from ..data.recording import Recording, uniform
 from ..data.writing import csv_text
@@ -66,12 +67,12 @@ def fitted(
     bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
-    log = uniform(recording)
+    log = uniform(recording) if recording.num_samples <= MOST else recording
     chosen: AbstractProjection | None = None
     if projection == "closed-windows":
         chosen = ClosedWindows()
     elif projection == "weak-form":
-        chosen = WeakForm(kernel_half_width(prepare(log)))
+        chosen = WeakForm(kernel_half_width(prepare(uniform(excerpt(log)))))
     try:
         found = identify_recording(model, log, projection=chosen, bounds=bounds)
     except ValueError as error:
@@ -188,7 +189,7 @@ def draw(found: Identified, recording: Recording, path: str | Path) -> None:
     """Write the picture of an identification."""
     from ..report import pictures
 
-    drawn = dataclasses.replace(uniform(recording), source=recording.source)
+    drawn = dataclasses.replace(uniform(excerpt(recording)), source=recording.source)
     write_bytes(path, pictures.render(found, drawn, Path(path).suffix.lstrip(".").lower()))
 
 

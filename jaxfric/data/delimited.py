@@ -206,10 +206,10 @@ def _signs(
                 continue
             if kind == "several" and not re.search(r"\d[.,]\d{3}[.,]", text):
                 continue
-            cell = re.search(f'(?m)(?:^|{between})[ "]*({kinds[kind]})[ "]*(?={between}|$)', text)
-            if cell:
-                row = number + 1 + text.count("\n", 0, cell.start(1))
-                found[kind] = cell[1], f"row {row}"
+            one = re.search(f'(?m)(?:^|{between})[ "]*({kinds[kind]})[ "]*(?={between}|$)', text)
+            if one:
+                above = text.count("\n", 0, one.start(1))
+                found[kind] = one[1], f"row {number + above + 1}"
     point, comma, several = (found.get(kind) for kind in ("point", "comma", "several"))
     if several or (point and comma):
         cell, row = several or comma

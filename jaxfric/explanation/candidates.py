@@ -17,6 +17,9 @@ from .predictions import PREDICTED
 from .spectral_lines import SpectralLines, line_frequencies, time_frequencies
 from .threads import begin
 
+# Bytes of columns that are kept from round to round; those beyond are computed in each.
+KEPT = 1 << 28
+
 
 class Candidate(NamedTuple):
     """A term of an effect, and the places of β to try: `betas`, `(G, d)`.
@@ -51,6 +54,8 @@ class CandidateSet:
         none = np.zeros(evidence.motion.num_samples)
         seen = evidence.with_channels(**dict.fromkeys(PREDICTED, none))
         own = [each for each in self.candidates if not each.term.coordinates & PREDICTED]
+        self._widest = _widest(own)
+        own = _within([c for c in own if id(c) not in self._widest], len(evidence.target))
         started = begin(functools.partial(_columns, seen), own)
         self._kept = dict(zip(map(id, own), started, strict=True))
 
@@ -66,13 +71,40 @@ class CandidateSet:
 
     def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
         """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
-        known = self._kept.get(id(candidate))
-        return _columns(evidence, candidate) if known is None else known.result()
+        known = self._kept.get(self._widest.get(id(candidate), id(candidate)))
+        if known is None:
+            return _columns(evidence, candidate)
+        lines = candidate.lines
+        return known.result() if lines is None else known.result()[:, : 2 * lines.harmonics]
 
     def close(self) -> None:
         """Begin no more columns."""
         for columns in self._kept.values():
             columns.cancel()
+
+    def forget(self) -> None:
+        """Keep no columns any more: what is asked for is computed."""
+        self.close()
+        self._kept = {}
+
+
+def _widest(candidates: list[Candidate]) -> dict[int, int]:
+    """Waves whose columns begin those of others, which have more harmonics: whose, by `id`."""
+    found: dict[int, int] = {}
+    most: dict[Any, Candidate] = {}
+    waves = [(c.lines, c) for c in candidates if c.lines is not None]
+    for lines, each in sorted(waves, key=lambda pair: -pair[0].harmonics):
+        wide = most.setdefault((lines[:3], each.betas.tobytes()), each)
+        if wide is not each:
+            found[id(each)] = id(wide)
+    return found
+
+
+def _within(candidates: list[Candidate], rows: int) -> list[Candidate]:
+    """Those of the candidates, of so many rows, whose columns are kept; waves are soon computed."""
+    ordered = sorted(candidates, key=lambda c: c.lines is not None)
+    sizes = [4 * rows * len(c.betas) * max(1, len(c.term.affine)) for c in ordered]
+    return [c for c, whole in zip(ordered, np.cumsum(sizes), strict=True) if whole <= KEPT]
 
 
 def _columns(evidence: Evidence, candidate: Candidate) -> np.ndarray:
@@ -86,10 +118,14 @@ def _signals(motion: Recording) -> dict[str, Any]:
 
 
 def scaled(raw: np.ndarray) -> np.ndarray:
-    """Columns `(G, J, k)` as the bootstrap reads them: largest value one, `(G, k, J)`, float32."""
-    columns = np.ascontiguousarray(raw.transpose(0, 2, 1))
+    """Columns `(G, J, k)` as the bootstrap reads them: largest value one, `(G, k, J)`, float32.
+
+    In place where they are float32.
+    """
+    columns = raw.transpose(0, 2, 1)
     size = np.maximum(columns.max(axis=2), -columns.min(axis=2))[..., None]
-    return (columns / np.where(size > 0, size, 1.0)).astype(np.float32, copy=False)
+    result = columns if columns.dtype == np.float32 else np.empty(columns.shape, np.float32)
+    return np.divide(columns, np.where(size > 0, size, 1.0), out=result, casting="same_kind")
 
 
 def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:

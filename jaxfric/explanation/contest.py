@@ -91,7 +91,7 @@ def contest(
     def scanned(candidate: Candidate) -> tuple[Scan, np.ndarray]:
         raw = field.columns(candidate, seen)
         scan = bootstrap(raw, candidate.effect.positive)
-        return scan, raw[scan.best : scan.best + 1]
+        return scan, raw[scan.best : scan.best + 1].copy()  # of all the others nothing stays
 
     scans, best = zip(*each(scanned, field.candidates), strict=True)
     drawn = np.array([s.drawn for s in scans])

@@ -14,12 +14,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
+from ..data.excerpt import MOST, SPARE, excerpt
 from ..data.recording import Recording
 from ..terms import KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
 from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
 from .evaluation import BATCH, PAIR, STEPPED, evaluate
-from .motion import Motion, derived
+from .motion import Motion, derived, motion_of
 from .nodes import NODES, STRIDE, averaged, node_signals, padded, windows
 
 
@@ -135,9 +136,9 @@ def gather(
     limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
-    width = int(half_width or min(signals.kernel_half_width(prepared), _widest(prepared)))
+    width = int(half_width or _usual(prepared))
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
-    step = max(1, round(width / NODES))
+    step = _spacing(width)
     span = float(step * NODES * limits.interval)
     parts = node_signals(prepared, limits, step, delay, motion.smoothed)
     index, whole, average, slope = windows(parts, span)
@@ -170,6 +171,30 @@ def gather(
         width=step * NODES,
         clock=bool(np.all(np.diff(time) > 0)),
     )
+
+
+def _usual(prepared: Recording) -> int:
+    """The half-width of the kernel, in samples, that a prepared recording suggests."""
+    return min(signals.kernel_half_width(prepared), _widest(prepared))
+
+
+def _spacing(width: int) -> int:
+    """Samples between two nodes."""
+    return max(1, round(width / NODES))
+
+
+# Nodes at most, some ten thousand rows: columns of all candidates at more would fill the memory,
+# and what ten thousand rows do not show is below what any law is off from a machine.
+LONGEST = 3 << 13
+
+
+def shortened(recording: Recording) -> Recording:
+    """The recording, or as much of it, evenly spread, as makes so many nodes."""
+    if recording.num_samples <= SPARE * LONGEST:
+        return recording
+    motion = motion_of(excerpt(recording))
+    most = LONGEST * _spacing(_usual(motion.padded))
+    return excerpt(recording, min(most, MOST))
 
 
 # Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an

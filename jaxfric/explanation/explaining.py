@@ -18,6 +18,7 @@ from .attributes import in_own_words
 from .baseline import Baseline, Mismatch, at_values, baseline_of, mismatch
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
+from .evidence import shortened
 from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
@@ -73,7 +74,7 @@ def explain(
 
 def _finished(found: Explanation, inputs: Inputs) -> Explanation:
     """The explanation in the caller's precision, and in the words of the simulator, if any."""
-    recording, looked = inputs.recording, inputs.looked
+    recording, looked = shortened(inputs.recording), inputs.looked
     models = {
         name: None if model is None else as_seen(inputs.figures.own(model), recording)
         for name in ("model", "baseline", "holdout_model")
@@ -83,7 +84,10 @@ def _finished(found: Explanation, inputs: Inputs) -> Explanation:
     for name in unseen(values, recording):
         values[name] = values[name]._replace(value=np.float64(np.nan))
     holdout = None if inputs.holdout is None else facts(inputs.holdout)
-    found = dataclasses.replace(found, **models, baseline_parameters=values, holdout=holdout)
+    found = dataclasses.replace(
+        found, **models, recording=facts(inputs.recording), baseline_parameters=values,
+        holdout=holdout,
+    )  # fmt: skip
     found = in_own_words(found, inputs.attributes) if inputs.attributes else found
     return found if looked is None else sanity.told(found, looked, inputs.figures.x64)
 
@@ -163,4 +167,7 @@ def _improved(
     if wrong is not None:
         first = at_values(known.model, findings.problem.evidence)
     doing("predicting with the improved model")
+    for problem in (findings.problem, findings.undelayed.problem):
+        for candidates in problem.candidate_sets:
+            candidates.forget()  # the predictions of a long recording need the memory
     return improved(first, findings, inputs.figures)

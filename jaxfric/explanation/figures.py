@@ -7,7 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ..data.recording import Recording, uniform
+from ..data.excerpt import MOST
+from ..data.recording import Recording
 from ..models import Model
 from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual
 
@@ -36,6 +37,7 @@ class Figures:
         self._prepared: dict[str, Prepared] = {}
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
+        self._errors: dict[Hashable, float] = {}
 
     def own(self, model: Model) -> Model:
         """The model in the precision of the recording."""
@@ -53,8 +55,12 @@ class Figures:
         return self._error(model, "held", delay)
 
     def _error(self, model: Model, where: str, delay: float | None) -> float:
-        moving, force = self._samples(where, delay_of(model) if delay is None else delay)
-        return relative(self._left(model, where)[moving], force[moving])
+        delay = delay_of(model) if delay is None else delay
+        key = *self._key(model, where), delay
+        if key not in self._errors:
+            moving, force = self._samples(where, delay)
+            self._errors[key] = relative(self._left(model, where)[moving], force[moving])
+        return self._errors[key]
 
     def _samples(self, where: str, delay: float) -> tuple[np.ndarray, np.ndarray]:
         """Which samples a figure is taken over, and the force, N, both `(N,)`."""
@@ -67,18 +73,25 @@ class Figures:
     def _motion(self, where: str) -> Prepared:
         """The recording with its velocity, in the caller's precision; once."""
         if where not in self._prepared:
-            self._prepared[where] = Prepared(uniform(self._recordings[where]))
+            self._prepared[where] = Prepared.of(self._recordings[where])
         return self._prepared[where]
 
-    def _left(self, model: Model, where: str) -> np.ndarray:
-        """What a model leaves of the force, N, `(N,)`; computed once."""
-        recording = self._recordings[where]
+    def _key(self, model: Model, where: str) -> tuple[Hashable, ...]:
         leaves, structure = jax.tree.flatten(self.own(model))
-        key = where, structure, tuple(np.asarray(leaf).tobytes() for leaf in leaves)
-        if key not in self._known:
-            with jax.enable_x64(self.x64):
-                self._known[key] = residual(self.own(model), recording, self._motion(where))
-        return self._known[key]
+        return where, structure, tuple(np.asarray(leaf).tobytes() for leaf in leaves)
+
+    def _left(self, model: Model, where: str) -> np.ndarray:
+        """What a model leaves of the force, N, `(N,)`; computed once, and kept but of a long
+        recording.
+        """
+        recording, key = self._recordings[where], self._key(model, where)
+        if key in self._known:
+            return self._known[key]
+        with jax.enable_x64(self.x64):
+            left = residual(self.own(model), recording, self._motion(where))
+        if recording.num_samples <= MOST:
+            self._known[key] = left
+        return left
 
     def floor(self, model: Model, lag: float) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.

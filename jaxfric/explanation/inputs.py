@@ -19,6 +19,7 @@ from ..terms.base import AbstractTerm
 from . import sanity
 from .baseline import baseline_of
 from .earlier import Earlier
+from .evidence import shortened
 from .figures import Figures, cast
 from .sanity import Looked
 
@@ -27,7 +28,7 @@ class Inputs(NamedTuple):
     """Recordings and baseline as the search takes them.
 
     - `recording`, `holdout`: with another simulator's force where the baseline stands on one.
-    - `sound`, `sound_holdout`: the same without samples that no actuator made.
+    - `sound`, `sound_holdout`: the same without samples that no actuator made; of long ones pieces.
     - `baseline`: a name, a sum of terms, a model, or a recording; `fixed`: its values stay.
     - `figures`: force errors in the caller's precision; `remarks`: about the recordings.
     - `looked`: what was looked at before any physics where the baseline is a simulator, whose
@@ -71,8 +72,11 @@ def prepare(
     if not isinstance(baseline, Recording):
         baseline_of(baseline)
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
-    sound, remarks = inspected(recording)
-    sound_holdout, more = (None, []) if holdout is None else inspected(holdout)
+    short = shortened(recording)
+    sound, remarks = inspected(short)
+    remarks += checks.cut(short.num_samples / recording.num_samples)
+    sound_holdout, more = (None, []) if holdout is None else inspected(shortened(holdout))
+    baseline = shortened(baseline) if isinstance(baseline, Recording) else baseline
     more = [each._replace(text=f"On the held-out recording: {each.text}") for each in more]
     remarks = [*remarks, *more]
     remarks = remarks if looked is None else looked.remarks(remarks)

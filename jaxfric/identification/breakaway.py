@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
+from ..data.excerpt import excerpt
 from ..data.recording import Recording, require
 from ..looks import text
 from ..models import Model
@@ -117,6 +118,7 @@ def breakaway(recording: Recording, found: Any) -> BreakAway:
     mass = _mass(found)
     if mass is None:
         return BreakAway((), (), found.model, "the inertia is not known")
+    recording = excerpt(recording)
     reach = 0
     if recording.velocity is None:  # a derivative rises before the axis does
         reach = signals.choose(recording).half_width

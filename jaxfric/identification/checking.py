@@ -14,11 +14,17 @@ from . import uncertainty
 from .identified import Identified, Result, result_names
 
 
-def faults(recording: Recording) -> np.ndarray:
-    """The faults of a recording as it was read, `(W,)`, or of a batch, `(B, W)`."""
+def faults(recording: Recording, given: int | None = None) -> np.ndarray:
+    """The faults of a recording as it was read, `(W,)`, or of a batch, `(B, W)`.
+
+    `given`: of how many samples it is an [`excerpt`][jaxfric.data.excerpt].
+    """
     host = jax.tree.map(np.asarray, recording)
     if recording.time.ndim == 1:
-        return checks.recorded(host)
+        found = checks.recorded(host)
+        if given is not None and given > recording.num_samples:
+            found[checks.NAMES.index("excerpt")] = recording.num_samples / given
+        return found
     rows = range(len(host.time))
     return np.stack([checks.recorded(jax.tree.map(lambda x, i=i: x[i], host)) for i in rows])
 

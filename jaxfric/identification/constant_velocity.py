@@ -16,6 +16,7 @@ import numpy as np
 
 from .. import signals
 from ..checks import Remark
+from ..data.excerpt import excerpt
 from ..data.recording import Recording, require
 from ..looks import text
 from ..models import Model
@@ -129,7 +130,7 @@ def held(recording: Recording, model: Model) -> list[dict[str, float]]:
 
 def _points(recording: Recording, found: Any) -> tuple[Recording, list[Stretch], list[Point]]:
     """The prepared recording, its stretches, and a point for each speed."""
-    log = jax.tree.map(np.asarray, signals.prepare(recording))
+    log = jax.tree.map(np.asarray, signals.prepare(excerpt(recording)))
     force = np.asarray(log.force, float) - beyond(found, log)
     stretches = steady(log, force, slowest_slip(log))
     mass = _mass(found)

@@ -5,6 +5,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from ..data.excerpt import excerpt
 from ..data.printable import json_text
 from ..data.provenance import sha256, versions
 from ..data.recording import Recording, uniform
@@ -74,7 +75,7 @@ def identification(
 
 def _half_width(recording: Recording) -> float:
     """Half the width of the kernel that is chosen from a recording, s."""
-    prepared = prepare(uniform(recording))
+    prepared = prepare(uniform(excerpt(recording)))
     return kernel_half_width(prepared) * float(interval(prepared))
 
 

@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float
 
 from .. import checks, programs, signals
 from ..checks import Design
+from ..data.excerpt import excerpt
 from ..data.recording import Recording, require, uniform
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
@@ -53,13 +54,16 @@ def identify(
     - `throw`: raise if any result is not successful.
 
     Outside of `jax.jit` the signals and what the model leaves of them are checked too: `warnings`
-    and `remarks` of the result, and signals that contradict each other are its `result`.
+    and `remarks` of the result, and signals that contradict each other are its `result`. Of more
+    than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so.
 
     **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, and,
     with `throw`, for any other failure.
     """
     require(recording, "identify", batch=True)
     traced, batch = signals.is_traced(recording), recording.time.ndim == 2
+    given = recording.num_samples
+    recording = recording if traced or batch else excerpt(recording)
     question = ask(
         model, recording if traced or batch else _plain(recording), projection, bounds, grid
     )
@@ -70,7 +74,7 @@ def identify(
         found, design = solve(*question._replace(projection=weak))
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((found, recording))):
-        found = checked(found, design, recording, faults(recording))
+        found = checked(found, design, recording, faults(recording, given))
     if throw:
         raise_unless_successful(found)
     return found

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
+from ..data.excerpt import excerpt
 from ..data.recording import Recording, require, require_force
 from ..looks import html, text
 from ..models import Model, listed_as, names, weighed
@@ -86,6 +87,7 @@ def select(
     require_force(recording, "select")
     if candidates is None:
         candidates = names()
+    recording = excerpt(recording)
     prepared = signals.prepare(recording)
     if isinstance(candidates, Mapping):
         width = signals.kernel_half_width(prepared)

@@ -46,7 +46,7 @@ def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
     position = np.asarray(recording.position)
     slope = polynomial.derivative(recording, position, choice.half_width, choice.degree)
     usable = np.isfinite(position) | ~np.asarray(recording.mask)
-    derived = np.where(usable, slope, np.nan).astype(position.dtype)
+    derived = np.where(usable, slope, np.nan).astype(position.dtype, copy=False)
     return dataclasses.replace(recording, velocity=derived)
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..data.excerpt import MOST, cut, excerpt, pieces
 from ..data.recording import Recording
 from .clock import host_interval
 
@@ -148,19 +149,23 @@ class _Log(NamedTuple):
     @classmethod
     def on(cls, time, signal, valid, segment, step: float) -> "_Log":
         valid = valid & np.isfinite(signal) & np.isfinite(time)
-        signal = np.where(valid, signal, 0.0)
+        signal = signal if valid.all() else np.where(valid, signal, 0.0)
         together = valid[1:] & valid[:-1] & (segment[1:] == segment[:-1])
         with np.errstate(invalid="ignore"):
             regular = together & (np.abs(np.diff(time) / step - 1) <= EVEN)
-        even = np.concatenate([[0], np.cumsum(~regular)])
+        even = np.zeros(len(time), np.int32)
+        np.cumsum(~regular, dtype=np.int32, out=even[1:])
         longest = int(np.max(np.bincount(segment[valid]), initial=0)) if valid.any() else 0
         return cls(time, signal, valid, segment, step, even, longest)
 
     def trimmed(self) -> "_Log":
         """The log up to its last valid sample: what it is padded with decides nothing."""
-        end = int(np.max(np.flatnonzero(self.valid), initial=-1)) + 1
+        return self.part(0, int(np.max(np.flatnonzero(self.valid), initial=-1)) + 1)
+
+    def part(self, start: int, stop: int) -> "_Log":
+        """The log from one sample to before another."""
         time, signal, valid, segment, even = (
-            x[:end] for x in (self.time, self.signal, self.valid, self.segment, self.even)
+            x[start:stop] for x in (self.time, self.signal, self.valid, self.segment, self.even)
         )
         return _Log(time, signal, valid, segment, self.step, even, self.longest)
 
@@ -314,7 +319,11 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
 
     **Arguments:** `signal`, `(N,)`, by default the position; `order` of the derivative, 1 or 2.
     """
-    log = _Log.of(recording, recording.position if signal is None else signal).trimmed()
+    whole = np.asarray(recording.position if signal is None else signal)
+    if recording.num_samples > MOST:
+        whole = cut(whole, pieces(np.asarray(recording.mask)))
+        recording = excerpt(recording)
+    log = _Log.of(recording, whole).trimmed()
     noise = min(log.noise(), LARGEST)
     tried: list[tuple[float, float, int, int]] = []
     least = dict.fromkeys(DEGREES, 0.0)  # of the bias² of wider candidates, by degree
@@ -459,8 +468,21 @@ def derivative(
     log = _Log.of(recording, signal)
     block = next((b for b in (1, *BLOCKS) if half_width <= b * HALF_WIDTHS[-1]), BLOCKS[-1])
     if block == 1:
-        return _everywhere(log, half_width, degree, order)
+        return _piecewise(log, half_width, degree, order)
     return _in_blocks(log, block, half_width, degree, order)
+
+
+def _piecewise(log: _Log, half_width: int, degree: int, order: int) -> np.ndarray:
+    """[`_everywhere`][], of a long record in pieces that reach into their neighbours."""
+    count, reach = len(log.signal), half_width + 1
+    if count <= MOST:
+        return _everywhere(log, half_width, degree, order)
+    out = np.empty(count)
+    for start in range(0, count, MOST):
+        first, stop = max(0, start - reach), min(start + MOST, count)
+        found = _everywhere(log.part(first, stop + reach), half_width, degree, order)
+        out[start:stop] = found[start - first : stop - first]
+    return out
 
 
 def _everywhere(log: _Log, half_width: int, degree: int, order: int) -> np.ndarray:
@@ -483,19 +505,28 @@ def _in_blocks(log: _Log, block: int, half_width: int, degree: int, order: int) 
     """The derivative of the means of blocks, which hold all that so wide a polynomial lets pass,
     and between them a straight line.
     """
-    inside = np.flatnonzero(log.valid)
+    every = bool(log.valid.all())
+    inside = slice(None) if every else log.valid
     segment = log.segment[inside]
-    first = np.searchsorted(segment, segment)  # segments are numbered in order
-    label = segment.astype(np.int64) * len(log.time) + (np.arange(len(inside)) - first) // block
-    _, start, group, count = np.unique(label, True, True, True)
-    time, signal = (np.bincount(group, x[inside]) / count for x in (log.time, log.signal))
-    every = np.ones(len(time), bool)
-    coarse = _Log.on(time, signal, every, segment[start], block * log.step)
-    found = _everywhere(coarse, -(-half_width // block), degree, order)
+    borders = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
+    spans = [slice(*pair) for pair in zip(borders[:-1], borders[1:], strict=True)]
+    starts = [np.arange(own.start, own.stop, block) for own in spans]
+    start = np.concatenate(starts)
+    count = np.diff(start, append=len(segment))
+    time, signal = (np.add.reduceat(x[inside], start) / count for x in (log.time, log.signal))
+    coarse = _Log.on(time, signal, np.ones(len(time), bool), segment[start], block * log.step)
+    found = _piecewise(coarse, -(-half_width // block), degree, order)
     out = np.zeros(len(log.signal))
-    for name in np.unique(segment):
-        own, blocks = inside[segment == name], np.flatnonzero(segment[start] == name)
-        out[own] = _straight(log.time[own], time[blocks], found[blocks])
+    at = log.time[inside]
+    slopes, done = out if every else np.empty(len(at)), 0
+    for own, blocks in zip(spans, starts, strict=True):
+        its = slice(done, done + len(blocks))
+        for first in range(own.start, own.stop, MOST):
+            piece = slice(first, min(first + MOST, own.stop))
+            slopes[piece] = _straight(at[piece], time[its], found[its])
+        done += len(blocks)
+    if not every:
+        out[inside] = slopes
     return out
 
 

@@ -1,8 +1,8 @@
 """Backward in time, as it were: the force that a recorded motion needs."""
 
 import dataclasses
-from collections.abc import Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property, partial
 
 import equinox as eqx
 import jax
@@ -11,11 +11,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from .. import checks, signals
-from ..data.recording import Recording, require, uniform
+from ..data.excerpt import MOST, excerpt
+from ..data.recording import Recording, pad, require, uniform
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
-from ..terms.base import summands
+from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
+
+# So many samples are predicted together.
+BLOCK = 1 << 16
 
 
 def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
@@ -30,11 +34,18 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     """
     require_model(model, "predict")
     require(recording, "predict")
-    return _force(model, Prepared(recording))
+    return jnp.asarray(_force(model, Prepared(recording)))
 
 
 class Prepared:
     """A recording with its velocity, and the derivative of its momentum: once for many models."""
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Prepared":
+        """The same, of one of few lengths, so that few programs serve all recordings; a long one,
+        of which a copy counts, as it is.
+        """
+        return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
         self.recording = signals.prepare(recording)
@@ -56,8 +67,37 @@ class Prepared:
 def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
     prepared = with_channels(model, motion.recording)
-    rate = _rate(model.momentum(prepared), prepared, motion)
-    return _later(prepared, model.force(prepared) + rate, delay)
+    momentum: Callable[[Recording], Array | np.ndarray] = model.momentum
+    force: Callable[[Recording], Array | np.ndarray] = model.force
+    if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
+        momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
+    rate = _rate(momentum(prepared), prepared, motion)
+    return _later(prepared, force(prepared) + rate, delay)
+
+
+def _by_samples(model: Model) -> bool:
+    """Whether the model has no memory: its force at a sample follows from that sample alone."""
+    return model.bristles is None and all(isinstance(p, AbstractLaw) for p in _parts(model.term))
+
+
+def _parts(term: AbstractTerm) -> Iterator[AbstractTerm]:
+    """The single terms of a sum, of those with a direction both."""
+    for part in summands(term):
+        if isinstance(part, Directional):
+            yield from (*_parts(part.positive), *_parts(part.negative))
+        else:
+            yield part
+
+
+def _in_blocks(of: Callable[[Recording], Array], recording: Recording) -> np.ndarray:
+    """A function of each sample of a long recording, `(N,)`: its columns at once would be large."""
+    count = recording.num_samples
+    values = np.empty(count, recording.time.dtype)
+    for start in range(0, count, BLOCK):
+        stop = min(start + BLOCK, count)
+        part = jax.tree.map(lambda x, own=slice(start, stop): np.asarray(x)[own], recording)
+        values[start:stop] = np.asarray(of(pad(part, BLOCK)))[: stop - start]
+    return values
 
 
 def _rate(momentum: Float[Array, " N"], prepared: Recording, known: Prepared):
@@ -72,7 +112,7 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, known: Prepared):
         return signals.local_quadratic(prepared, momentum, span, signals.TRACED_REACH)[1]
     choice = known.choice
     rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree)
-    return jnp.asarray(rate, momentum.dtype)
+    return rate.astype(momentum.dtype, copy=False)
 
 
 def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
@@ -142,9 +182,9 @@ def in_motion(
     its force is for. At rest friction takes any value up to break-away. `prepared`: as in
     [`residual`][].
     """
-    motion = Prepared(uniform(recording)) if prepared is None else prepared
-    speed = np.abs(np.asarray(motion.recording.velocity))[: recording.num_samples]
-    moving = speed > float(signals.host_scales(motion.recording)[0].slowest)
+    motion = Prepared.of(recording) if prepared is None else prepared
+    slowest = float(signals.host_scales(excerpt(motion.recording))[0].slowest)
+    moving = np.abs(np.asarray(motion.recording.velocity))[: recording.num_samples] > slowest
     moving &= np.asarray(recording.mask)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
@@ -153,8 +193,9 @@ def in_motion(
 
 def unseen(names: Sequence[str], recording: Recording) -> list[str]:
     """The names of parameters (`+`, `-`) of a direction in which a recording does not move."""
-    velocity = np.asarray(signals.prepare(uniform(recording)).velocity)[: recording.num_samples]
-    velocity = velocity[in_motion(recording)]
+    prepared = Prepared.of(recording)
+    velocity = np.asarray(prepared.recording.velocity)[: recording.num_samples]
+    velocity = velocity[in_motion(recording, prepared=prepared)]
     idle = [s for s, ways in (("+", velocity > 0), ("-", velocity < 0)) if not ways.any()]
     return [name for name in names if name.endswith(tuple(idle))]
 
@@ -174,8 +215,7 @@ def residual(
     been done.
     """
     require_model(model, "predict")
-    # One of few lengths, so that few programs serve all recordings.
-    motion = Prepared(uniform(recording)) if prepared is None else prepared
+    motion = Prepared.of(recording) if prepared is None else prepared
     predicted = np.asarray(_force(model, motion), float)[: recording.num_samples]
     return np.asarray(recording.force, float) - predicted
 
@@ -186,10 +226,11 @@ def force_error(model: Model, recording: Recording) -> float:
     No filter but the derivative in û: the noise of the recorded force is in it. NaN where nothing
     moves or no force is recorded.
     """
-    prepared = Prepared(uniform(recording))
+    prepared = Prepared.of(recording)
     moving = in_motion(recording, delay_of(model), prepared)
-    force = np.asarray(recording.force, float)
-    return relative(residual(model, recording, prepared)[moving], force[moving])
+    left = residual(model, recording, prepared)[moving]
+    del prepared
+    return relative(left, np.asarray(recording.force, float)[moving])
 
 
 def relative(left: Float[np.ndarray, " M"], force: Float[np.ndarray, " M"]) -> float:

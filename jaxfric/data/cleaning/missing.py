@@ -55,12 +55,12 @@ def missing_rows(signals, mask, segment, rows, notes) -> np.ndarray:
 def _impossible(speed: np.ndarray, linked: np.ndarray) -> np.ndarray:
     """Which steps the motion around them cannot make, shape as `speed`."""
     found = np.zeros(len(speed), bool)
-    blocks = (_beside(speed, linked, start) for start in range(0, len(speed), BLOCK))
-    index, low, high, out, changes = map(list, zip(*blocks, strict=True))
-    index, low, high, out = map(np.concatenate, (index, low, high, out))
+    blocks = [_beside(speed, linked, start) for start in range(0, len(speed), BLOCK)]
+    index, low, high, out, change = map(np.concatenate, zip(*blocks, strict=True))
+    del blocks
     if not len(index):
         return found
-    floor = OUT * float(np.quantile(np.concatenate(changes), USUAL, overwrite_input=True))
+    floor = OUT * float(np.quantile(change, USUAL, overwrite_input=True))
     far = out > floor
     fast = np.abs(speed[index])
     found[index[far]] = True
@@ -76,7 +76,7 @@ class _Beside(NamedTuple):
     much they are outside; and the usual changes of speed, where the axis moves.
     """
 
-    index: np.ndarray
+    at: np.ndarray
     low: np.ndarray
     high: np.ndarray
     out: np.ndarray

@@ -1,0 +1,105 @@
+"""Memory by the row: long recordings are read and fitted in bounded memory."""
+
+import dataclasses
+import subprocess
+import sys
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import jaxfric as jf
+from jaxfric.data.excerpt import MOST, PIECES, excerpt
+from jaxfric.data.recording import pad
+from jaxfric.models import from_parameters
+from jaxfric.signals import polynomial
+from jaxfric.simulation import prediction
+
+
+def written(path, count):
+    """An axis that moves to and fro under Coulomb and viscous friction, with noise and counts."""
+    time = np.arange(count) * 1e-3
+    turn = 2 * np.pi * 0.31
+    velocity = 0.03 * turn * np.cos(turn * time)
+    noise = 0.5 * np.random.default_rng(0).normal(size=count)
+    force = -5 * 0.03 * turn**2 * np.sin(turn * time) + 20 * np.sign(velocity) + 60 * velocity
+    position = np.round(0.03 * np.sin(turn * time), 6)
+    np.savez(path, time=time, position=position, force=force + noise)
+    return path
+
+
+def test_an_excerpt_is_spread_over_the_recording_and_begins_segments():
+    count = 2 * MOST
+    values = np.arange(count, dtype=float)
+    recording = jf.Recording(time=values, force=values, velocity=values)
+    some = excerpt(recording)
+    assert some.num_samples == MOST and some.num_segments == PIECES
+    time, segment = np.asarray(some.time), np.asarray(some.segment)
+    assert time[0] == 0 and time[-1] == count - 1
+    within = np.diff(segment) == 0
+    assert np.all(np.diff(time)[within] == 1) and np.all(np.diff(time)[~within] > 1)
+    # Masked samples at the end, by which recordings are padded, are no part of it.
+    longer = pad(recording, count + 4096)
+    np.testing.assert_array_equal(np.asarray(excerpt(longer).time), time)
+
+
+def test_a_recording_of_usual_length_is_whole():
+    recording = jf.Recording(time=np.arange(MOST), force=np.zeros(MOST), velocity=np.zeros(MOST))
+    assert excerpt(recording) is recording
+
+
+@pytest.mark.parametrize("half_width", [16, 400])
+def test_a_derivative_in_pieces_is_that_of_the_whole(tmp_path, monkeypatch, half_width):
+    recording = jf.read(written(tmp_path / "log.npz", 20_000))
+    mask = np.asarray(recording.mask).copy()
+    mask[5000:5100] = False
+    recording = dataclasses.replace(recording, mask=mask)
+    position = np.asarray(recording.position)
+    whole = polynomial.derivative(recording, position, half_width)
+    monkeypatch.setattr(polynomial, "MOST", 3000)
+    pieces = polynomial.derivative(recording, position, half_width)
+    np.testing.assert_allclose(pieces, whole, rtol=1e-9, atol=1e-12)
+
+
+def test_a_force_in_blocks_is_that_of_the_whole(tmp_path, monkeypatch):
+    recording = jf.read(written(tmp_path / "log.npz", 20_000))
+    names = {"coulomb": 20.0, "viscous": 60.0, "stribeck_force": 3.0, "stribeck_velocity": 0.01}
+    values = {name + sign: v for name, v in names.items() for sign in "+-"} | {"inertia": 5.0}
+    model = from_parameters(jf.models.gaussian(), values)
+    whole = np.asarray(jf.predict(model, recording))
+    monkeypatch.setattr(prediction, "MOST", 3000)
+    monkeypatch.setattr(prediction, "BLOCK", 4096)
+    np.testing.assert_array_equal(np.asarray(jf.predict(model, recording)), whole)
+
+
+def traced(path):
+    tracemalloc.start()
+    jf.read(path)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak
+
+
+@pytest.mark.slow
+def test_reading_takes_less_than_ten_columns(tmp_path):
+    """Three columns of eight bytes are read: of each row 24 bytes stay, and 80 are held at once."""
+    small, large = (written(tmp_path / f"{n}.npz", n) for n in (500_000, 2_000_000))
+    assert (traced(large) - traced(small)) / 1_500_000 < 80
+
+
+def resident(*arguments):
+    """The largest resident memory of a command, bytes."""
+    code = (
+        "import resource, sys; from jaxfric.cli import main; code = main();"
+        "print(1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(code)"
+    )
+    run = [sys.executable, "-c", code, *map(str, arguments)]
+    done = subprocess.run(run, capture_output=True, text=True, check=True)
+    return int(done.stdout.split()[-1])
+
+
+@pytest.mark.slow
+def test_identify_takes_a_hundred_bytes_by_the_row(tmp_path):
+    """Of the rows beyond those that are fitted; it was 900."""
+    small, large = (written(tmp_path / f"{n}.npz", n) for n in (500_000, 2_500_000))
+    assert (resident("identify", large) - resident("identify", small)) / 2_000_000 < 120
