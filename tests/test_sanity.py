@@ -215,3 +215,17 @@ def test_a_payload_picked_up_is_mass_of_the_last_body_from_its_moment_on(motion)
     moment, mass = (finding.parameters[n] for n in ("step_time", "payload_body/forearm/mass"))
     assert float(moment.value) == pytest.approx(6.0, abs=0.2)
     assert float(mass.value) == pytest.approx(0.6, abs=0.02)
+
+
+def test_a_motion_that_repeats_and_a_force_of_another_unit_are_no_clock():
+    """A current beside a simulator without friction: shifted by half a period it would be nearer."""
+    time = np.arange(0, 12, 0.002)
+    rate = 2 * np.pi * 0.5
+    position, speed = np.sin(rate * time), rate * np.cos(rate * time)
+    needed = -12.0 * rate**2 * position
+    noise = 0.01 * np.random.default_rng(0).normal(size=time.shape)
+    current = needed / 20 + 1.5 * np.tanh(speed / 1e-3) + 1.9 * speed + noise
+    count = 2 * np.pi / 2**17
+    log = Recording(time, current, count * np.round(position / count), units=UNITS)
+    (joint,) = look([Part(log, None, Known(needed))])
+    assert not wrong(joint).keys() & {"clock", "force_limit", "end_stop"}

@@ -1,7 +1,7 @@
 """Wrong values of another simulator in its own words: what belongs to it, from what to what."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from .sentences import quantity
 GAIN, CONSTANT = "gain", "offset"
 # More than these no one reads.
 MOST = 4
+POSITIVE = {"armature", "damping", "frictionloss", "inertia", "mass", "stiffness"}
 STIFFNESS, REFERENCE = "stiffness", "springref"
 
 
@@ -39,7 +40,8 @@ def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
     moved = _attributes(finding.parameters, own)
     texts = [_text(name, m, own) for name, m in moved.items()]
     texts = [
-        text + _doubt(name, finding.instead, own) for text, name in zip(texts, moved, strict=True)
+        text + _doubt(name, m, finding.instead, own)
+        for text, (name, m) in zip(texts, moved.items(), strict=True)
     ]
     share = f"{finding.share:.0%} of the unexplained force"
     names = [name for name in moved if name in own or name.endswith(REFERENCE)]
@@ -71,7 +73,13 @@ def _attributes(moved: Mapping[str, Moved], own: Mapping[str, Attribute]) -> dic
 
 
 def _gear(own: Mapping[str, Attribute]) -> str:
-    attribute = own[GAIN]
+    """The name of the gain: the actuator's gear where there is one.
+
+    A model whose force the joint's own values make alone has no gain beside them.
+    """
+    attribute = own.get(GAIN)
+    if attribute is None:
+        return GAIN
     return attribute.owner.replace(" ", "/", 1) + "/gear" if attribute.what == "gear" else GAIN
 
 
@@ -112,20 +120,29 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
     if name in own:
         attribute = own[name]
         text = f"{attribute.owner}: {attribute.what} {attribute.value:.4g} → {said}"
-        missing = attribute.what == STIFFNESS and not attribute.value
+        missing = attribute.what == STIFFNESS and not attribute.value and m.value > 0
         return f"missing, a spring: {text}" if missing else text
     kind, owner, what = name.split("/")
     return f"{kind} {owner}: {what} {m.before:.4g} → {said}"
 
 
-def _doubt(name: str, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]) -> str:
+def _doubt(
+    name: str, m: Moved, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]
+) -> str:
     """What else it may be: what no motion tells from it, and what this one does not."""
     key = GAIN if name == _gear(own) else name
-    texts = []
-    if key in own and own[key].alike:
-        texts.append(f"or {' or '.join(own[key].alike)}: no motion of this joint tells them apart")
+    alike = own[key].alike if key in own else ()
+    impossible = key in own and own[key].what.split()[0] in POSITIVE and m.value < 0
+    texts = ["which cannot be below zero"] if impossible else []
+    if alike:
+        said = _listed(alike, f"{len(alike) - MOST} others")
+        texts.append(f"or {said}: no motion of this joint tells them apart")
     if others := instead.get(key):
-        said = " or ".join(str(own[n]) if n in own else "a constant force" for n in others[:MOST])
-        said += " or others" * (len(others) > MOST)
-        texts.append(f"or {said}: this motion cannot tell them apart")
+        names = [str(own[n]) if n in own else "a constant force" for n in others]
+        texts.append(f"or {_listed(names, 'others')}: this motion cannot tell them apart")
     return f" ({'; '.join(texts)})" if texts else ""
+
+
+def _listed(names: Sequence[str], others: str) -> str:
+    """The first names of a list, and that there are others."""
+    return " or ".join([*names[:MOST], *([others] if len(names) > MOST else [])])

@@ -16,6 +16,8 @@ from ...data.recording import Recording
 from ...simulators import Mujoco
 from ..baseline import _fewest as fewest
 from ..naming import LINEARITY
+from ..predictions import rate
+from ..regression import orthonormal
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
 ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
@@ -231,21 +233,29 @@ def _chosen(stack: Stack, rows: Sequence[Rows]) -> tuple[str, ...]:
 
 
 def _shift(rows: Sequence[Rows]) -> float:
-    """How late the force is, s, where whole nodes halve what is left; else zero."""
+    """How late the force is, s, where whole nodes halve what any values leave; else zero.
+
+    A gain, inertia, friction and a constant are fitted beside each shift: where values are wrong,
+    a force of the wrong size is near a shifted one too, above all where the motion repeats.
+    """
     step = min(each.evidence.reach for each in rows) / 6
     first = nodes(rows[0])
     even = np.arange(first[0], first[-1], step)
+    most = len(even) // FARTHEST
+    inner = slice(most, len(even) - most)
     pairs = []
     for each in rows:
         at, motion = nodes(each), each.evidence.motion
         known = np.asarray(motion.channels["known_force"], float)
-        force = np.asarray(motion.force, float)
-        pairs.append([each.weight * np.interp(even, at, x) for x in (force, known)])
-    most = len(even) // FARTHEST
-    inner = slice(most, len(even) - most)
+        speed = np.asarray(motion.velocity, float)
+        plain = known, rate(each.evidence, speed), speed, np.sign(speed), np.ones_like(speed)
+        columns = [np.interp(even, at, x) for x in plain]
+        force = each.weight * np.interp(even, at, np.asarray(motion.force, float))
+        pairs.append((force, orthonormal(np.stack(columns, axis=1)[inner])))
 
     def left(shift: int) -> float:
-        return sum(float(np.sum((np.roll(u, -shift)[inner] - f[inner]) ** 2)) for u, f in pairs)
+        moved = [(np.roll(force, -shift)[inner], basis) for force, basis in pairs]
+        return sum(float(force @ force - np.sum((basis.T @ force) ** 2)) for force, basis in moved)
 
     tried = {shift: left(shift) for shift in range(-most, most + 1)}
     best = min(tried, key=lambda shift: tried[shift])
