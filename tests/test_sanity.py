@@ -218,7 +218,7 @@ def test_a_payload_picked_up_is_mass_of_the_last_body_from_its_moment_on(motion)
 
 
 def test_a_motion_that_repeats_and_a_force_of_another_unit_are_no_clock():
-    """A current beside a simulator without friction: shifted by half a period it would be nearer."""
+    """A current beside a simulator without friction: half a period later it would be nearer."""
     time = np.arange(0, 12, 0.002)
     rate = 2 * np.pi * 0.5
     position, speed = np.sin(rate * time), rate * np.cos(rate * time)
