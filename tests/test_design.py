@@ -10,7 +10,7 @@ import pytest
 import jaxfric as jf
 from jaxfric.cli import main
 from jaxfric.identification.design import columns, design, errors
-from jaxfric.identification.motion import Limits, multisine, sine
+from jaxfric.identification.motion import Limits, from_rest, led, multisine, sine
 from jaxfric.identification.separation import separate
 
 LIMITS = Limits(0.05, 0.2, 2.0, 60.0, 4.0, 0.004)
@@ -42,6 +42,28 @@ def test_the_limits_are_kept_and_one_is_reached(found):
         wanted = np.asarray(getattr(motion, other))[5:-5]
         np.testing.assert_allclose(slope, wanted, atol=2e-3 * np.max(np.abs(wanted)))
     assert float(motion.velocity[0]) == pytest.approx(float(motion.velocity[-1]), abs=1e-9)
+
+
+def test_the_axis_comes_into_it_from_rest_within_the_limits():
+    """The motion itself is another beginning of the same period."""
+    limits = LIMITS._replace(centre=0.3, interval=5e-4)
+    drawn = jnp.asarray(np.random.default_rng(4).normal(size=(2, 8)) / np.arange(1, 9))
+    turned = multisine(from_rest(drawn), limits)
+    assert float(turned.velocity[0]) == pytest.approx(0, abs=1e-6)
+    plain = multisine(drawn, limits)
+    np.testing.assert_allclose(
+        np.sort(turned.position), np.sort(plain.position), atol=limits.velocity * limits.interval
+    )
+    motion = led(turned, limits)
+    assert abs(float(motion.position.max() + motion.position.min()) - 0.6) < 0.1
+    for name, middle in (("position", 0.3), ("velocity", 0), ("acceleration", 0), ("jerk", 0)):
+        most = np.max(np.abs(np.asarray(getattr(motion, name)) - middle))
+        assert most <= 1.001 * getattr(limits, name), name
+    assert motion.velocity[0] == motion.velocity[-1] == motion.acceleration[0] == 0
+    for one, other in (("position", "velocity"), ("velocity", "acceleration")):
+        values, wanted = (np.asarray(getattr(motion, name)) for name in (one, other))
+        slope = np.gradient(values, limits.interval)[2:-2]
+        np.testing.assert_allclose(slope, wanted[2:-2], atol=0.02 * np.max(np.abs(wanted)))
 
 
 def test_no_motion_of_the_plain_sine_is_better(axis, found):
@@ -115,16 +137,18 @@ def test_rivals_are_told_apart_better(separated):
 
 @pytest.mark.slow
 def test_what_is_apart_is_what_the_best_imitation_leaves(separated):
-    """Beside least squares by numpy, on the designed motion as a user would fit it."""
+    """Beside least squares by numpy, over the samples that are no kernel from a reversal."""
     motion = separated.motion
-    force = columns(jf.terms.Spring(), motion)[:, 0] * 60.0
-    sides = [np.where(np.sign(motion.velocity) == s, 1.0, 0.0) for s in (1, -1)]
-    base = [motion.acceleration, *sides, *(side * motion.velocity for side in sides)]
+    x, v, a = (np.asarray(part) for part in motion[1:4])
+    slow = (16 * LIMITS.interval * a) ** 2 + (0.006 * np.max(np.abs(v))) ** 2
+    weight = np.sqrt(v**2 / (v**2 + slow))
+    sides = [np.where(np.sign(v) == sign, 1.0, 0.0) for sign in (1, -1)]
+    base = [a, *sides, *(side * v for side in sides)]
     left = []
     for centre in np.linspace(-0.05, 0.05, 24):
-        matrix = np.stack([*base, (np.asarray(motion.position) - centre) ** 3], axis=1)
-        fitted = np.linalg.lstsq(matrix, force, rcond=None)[0]
-        left.append(np.sqrt(np.mean((force - matrix @ fitted) ** 2)))
+        matrix = weight[:, None] * np.stack([*base, (x - centre) ** 3], axis=1)
+        fitted = np.linalg.lstsq(matrix, weight * 60.0 * x, rcond=None)[0]
+        left.append(np.sqrt(np.mean((weight * 60.0 * x - matrix @ fitted) ** 2)))
     told = next(each for each in separated.apart if each.other == "hardening_spring")
     assert told.after == pytest.approx(min(left), rel=1e-3)
 
@@ -141,6 +165,8 @@ def test_what_no_motion_shows_is_left_out():
 def test_misuse_is_said(axis):
     with pytest.raises(ValueError, match="jerk"):
         design(axis, LIMITS._replace(jerk=0.0))
+    with pytest.raises(ValueError, match="centre"):
+        design(axis, LIMITS._replace(centre=float("nan")))
     with pytest.raises(ValueError, match="stribeck_velocity"):
         design(axis.with_parameters({"stribeck_velocity": float("nan")}), LIMITS)
 

@@ -9,7 +9,7 @@ from ..data.io import write_table
 from ..data.targets import standard
 from ..identification import documents
 from ..identification.design import Design, design
-from ..identification.motion import Limits
+from ..identification.motion import Limits, led
 from ..identification.separation import separate
 from ..looks.text import Table, text
 from ..models import Model
@@ -25,7 +25,7 @@ def run(arguments: Namespace) -> int:
         raise ValueError("--interval is longer than a hundredth of --duration: sample faster.")
     limits = Limits(
         arguments.position, arguments.velocity, arguments.acceleration, arguments.jerk,
-        arguments.duration, arguments.interval,
+        arguments.duration, arguments.interval, arguments.centre,
     )  # fmt: skip
     rivals = _rivals(arguments.model)
     try:
@@ -35,7 +35,7 @@ def run(arguments: Namespace) -> int:
             found = design(model, limits, arguments.noise)
     except ValueError as error:
         raise ValueError(f"{arguments.model}: {error}") from error
-    motion = found.motion
+    motion = led(found.motion, limits)
     columns = {
         "time": motion.time,
         "reference": motion.position,
@@ -46,7 +46,13 @@ def run(arguments: Namespace) -> int:
     if quiet:
         write_table(arguments.out, columns)
     else:
-        put_table(arguments.out, columns, [], f"{motion.time.size} samples")
+        low, high = float(motion.position.min()), float(motion.position.max())
+        unit = dict(model.units)["position"]
+        put_table(
+            arguments.out, columns, [],
+            f"{motion.time.size} samples, {float(motion.time[-1]):.4g} s from rest to rest, "
+            f"positions {low:.4g} to {high:.4g} {unit}",
+        )  # fmt: skip
     if arguments.json:
         made = documents.made("jaxfric.design/1", arguments.model)
         put(arguments.json, documents.to_json(made | found.to_dict()))

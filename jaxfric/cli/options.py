@@ -332,6 +332,9 @@ def designing(command: ArgumentParser) -> None:
             f"--{name}", type=seconds, default=value, metavar="SECONDS", help=f"default: {value:g}"
         )
     command.add_argument(
+        "--centre", type=number, default=0.0, metavar="X", help="middle of the stroke (default: 0)"
+    )
+    command.add_argument(
         "--noise", type=positive, metavar="FORCE", help="of a sample of force (default: 2 %% of it)"
     )
 

@@ -16,7 +16,7 @@ from jaxtyping import Array, Float
 from ..models import Model
 from ..terms.base import AbstractTerm
 from ..units import spell
-from .motion import Limits, Motion, multisine, search, sine
+from .motion import Limits, Motion, from_rest, multisine, search, sine
 
 STEPS = 150
 # White noise of the force beside the root mean square of its own, where none is given.
@@ -114,13 +114,16 @@ def design(model: Model, limits: Limits, noise: float | None = None, steps: int 
         found = errors(model, multisine(coefficients, limits), noise) / scale
         return jnp.log(jnp.sum(found**2))
 
-    motion = multisine(search(cost, limits, steps), limits)
+    motion = multisine(from_rest(search(cost, limits, steps)), limits)
     return Design(motion, noise, gains(model, (first, motion), noise))
 
 
 def checked(model: Model, limits: Limits) -> Model:
     """The model, where it and the limits have values that a motion can be designed for."""
-    wrong = [n for n, v in limits._asdict().items() if not 0 < v < np.inf]
+    sizes = limits._asdict()
+    centre = sizes.pop("centre")
+    wrong = [n for n, v in sizes.items() if not 0 < v < np.inf]
+    wrong += ["centre"] * (not np.isfinite(centre))
     if wrong:
         raise ValueError(f"Limits are over zero and finite; {', '.join(wrong)} is not.")
     if lacking := [n for n, v in model.parameters.items() if not np.isfinite(float(v))]:

@@ -1,10 +1,11 @@
-"""Motions within limits: multisines that start and end at rest and repeat."""
+"""Motions within limits: multisines that repeat, and how the axis comes into them from rest."""
 
 from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
@@ -16,7 +17,7 @@ STARTS = 4
 
 class Limits(NamedTuple):
     """The most that a drive may do, to each side: position m, velocity m/s, acceleration m/s²,
-    jerk m/s³; and the motion's duration and sampling interval, s.
+    jerk m/s³; the motion's duration and sampling interval, s; and the middle of the stroke, m.
     """
 
     position: float
@@ -25,6 +26,7 @@ class Limits(NamedTuple):
     jerk: float
     duration: float = 10.0
     interval: float = 0.002
+    centre: float = 0.0
 
 
 class Motion(NamedTuple):
@@ -61,7 +63,49 @@ def multisine(coefficients: Float[Array, "2 H"], limits: Limits) -> Motion:
         parts.append((a * power) @ one[0] + (b * power) @ one[1])
     most = (limits.position, limits.velocity, limits.acceleration, limits.jerk)
     used = jnp.stack([jnp.max(jnp.abs(p)) / m for p, m in zip(parts, most, strict=True)])
-    return Motion(time, *(p / jnp.max(used) for p in parts))
+    scaled = [p / jnp.max(used) for p in parts]
+    return Motion(time, limits.centre + scaled[0], *scaled[1:])
+
+
+def from_rest(coefficients: Float[Array, "2 H"]) -> Float[Array, "2 H"]:
+    """The same motion, begun at its turning point of least acceleration."""
+    a, b = np.asarray(coefficients, float)
+    order = np.arange(1, a.size + 1)
+    phase = np.linspace(0, 2 * np.pi, 512 * a.size + 1)
+    turned = np.outer(phase, order)
+    speed = np.cos(turned) @ (b * order) - np.sin(turned) @ (a * order)
+    slope = np.cos(turned) @ (a * order**2) + np.sin(turned) @ (b * order**2)
+    ends = np.flatnonzero(np.sign(speed[1:]) != np.sign(speed[:-1]))
+    first = ends[np.argmin(np.abs(slope[ends]))]
+    step = speed[first] / (speed[first] - speed[first + 1])
+    shift = order * (phase[first] + step * (phase[1] - phase[0]))
+    cosine, sine = np.cos(shift), np.sin(shift)
+    turned = np.stack([a * cosine + b * sine, b * cosine - a * sine])
+    return jnp.asarray(turned, coefficients.dtype)
+
+
+def led(motion: Motion, limits: Limits) -> Motion:
+    """A motion between turning points with a run-in from rest before it and a run-out behind.
+
+    The acceleration runs from zero to that of the turning point as 3s² − 2s, s from 0 to 1: it
+    leaves no velocity, and keeps within the limits if it takes 4 a/j.
+    """
+    step = limits.interval
+    top = float(motion.acceleration[0])
+    count = max(int(np.ceil(4 * abs(top) / limits.jerk / step)), 1)
+    length, s = count * step, np.arange(count) / count
+    parts = (
+        float(motion.position[0]) + top * length**2 * (s**4 / 4 - s**3 / 3 + 1 / 12),
+        top * length * (s**3 - s**2),
+        top * (3 * s**2 - 2 * s),
+        top * (6 * s - 2) / length,
+    )
+    whole = [
+        np.concatenate([run, np.asarray(part), sign * run[::-1] + 0.0])
+        for run, part, sign in zip(parts, motion[1:], (1, -1, 1, -1), strict=True)
+    ]
+    time = step * np.arange(whole[0].size)
+    return Motion(*(jnp.asarray(x, motion.time.dtype) for x in (time, *whole)))
 
 
 def sine(limits: Limits, dtype=float) -> Float[Array, "2 H"]:

@@ -21,7 +21,7 @@ from ..terms.effects import effect
 from ..terms.sample import Scales
 from .deciding import STRONG, own, shapes
 from .design import STEPS, Design, checked, columns, gains, noise_of
-from .motion import Limits, Motion, multisine, search, sine
+from .motion import Limits, Motion, from_rest, multisine, search, sine
 from .reduced import orthonormal, root
 
 # Places of nonlinear parameters: of the effect that is true, and of the one fitted in its stead.
@@ -100,7 +100,8 @@ def separate(
         return -jnp.mean(jnp.stack(told))
 
     # As arguments, not as constants, so that one program serves all models of one structure.
-    motion = multisine(search(cost, limits, steps, (model, known, jnp.asarray(noise))), limits)
+    best = search(cost, limits, steps, (model, known, jnp.asarray(noise)))
+    motion = multisine(from_rest(best), limits)
     motions = (multisine(plain, limits), motion)
     apart = [
         each
@@ -218,8 +219,8 @@ def _known(model: Model, pair: _Pair, limits: Limits, plain: Motion) -> _Known:
 def _scales(limits: Limits) -> Scales:
     """What a motion within the limits would say about magnitudes."""
     slowest = signals.SLIP_SHARE * limits.velocity
-    values = (slowest, limits.velocity, -limits.position, limits.position, 1.0, 0.0,
-              limits.duration, limits.interval)  # fmt: skip
+    low, high = limits.centre - limits.position, limits.centre + limits.position
+    values = (slowest, limits.velocity, low, high, 1.0, 0.0, limits.duration, limits.interval)
     return Scales(*(jnp.asarray(x, float) for x in values))
 
 
