@@ -14,10 +14,10 @@ from ...simulation.prediction import in_motion
 from ...terms import KNOWN_FORCE
 from ..significance import FEWEST
 
-# Break-away is seldom more than twice what friction resists in slip, and the usual force of a
-# motion is half of that at least, whatever inertia and gravity add to it or take off. Nor is it
-# inertia: where a motion ends, that asks for a force inwards.
-HOLDS = 4.0
+# Break-away is seldom more than twice what friction resists in slip: half of what the force differs
+# by between both directions, since gravity and inertia are the same in both. Nor is less than twice
+# the usual force asked about, nor a force inwards, as inertia asks for where a motion ends.
+HOLDS = 2.0
 # A stop is met at the end of the stroke; what lies before that is the axis elsewhere.
 END = 0.25
 # So many times as steep as a spring over the stroke: what rises slower is looked for as a spring.
@@ -78,7 +78,7 @@ def _at_end(recording: Recording, upper: bool) -> Contact | None:
     inner = in_motion(recording) & (outward < end) & valid
     if not inner.any():
         return None
-    most = HOLDS * float(np.median(np.abs(force[inner])))
+    most = HOLDS * max(float(np.median(np.abs(force[inner]))), _friction(recording, force, inner))
     pressed = np.flatnonzero(valid & (np.minimum(excess, side * force) > most))
     elsewhere = int(np.count_nonzero(outward[pressed] < end))
     pressed = pressed[outward[pressed] >= end]
@@ -98,6 +98,16 @@ def _at_end(recording: Recording, upper: bool) -> Contact | None:
         return None
     power = float(np.sum(excess[beyond] ** 2) / np.sum(excess[valid] ** 2))
     return contact._replace(samples=int(np.count_nonzero(beyond)), share=power)
+
+
+def _friction(recording: Recording, force: np.ndarray, where: np.ndarray) -> float:
+    """Half of what the usual force differs by between both directions, N."""
+    forward = np.gradient(np.asarray(recording.position, float)) > 0
+    ways = (where & forward, where & ~forward)
+    if not all(way.any() for way in ways):
+        return 0.0
+    there, back = (float(np.median(force[way])) for way in ways)
+    return max(there - back, 0.0) / 2
 
 
 def _known(recording: Recording) -> np.ndarray | None:
