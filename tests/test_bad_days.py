@@ -629,7 +629,7 @@ def test_a_range_beyond_all_numbers_is_refused(target, top, capfd):
 def test_a_held_out_recording_without_a_position_is_named():
     here, held = a_log(), jf.Recording(time=TIME, force=FORCE, velocity=POSITION, source="held")
     candidate = Namespace(term=terms.Cogging(), effect=Namespace(name="cogging"))
-    found = Namespace(taken=[Namespace(trial=Namespace(candidate=candidate))])
+    found = Namespace(selected=[Namespace(trial=Namespace(candidate=candidate))])
     holdout.check_signals(found, here, here)
     with pytest.raises(ValueError, match="held lacks 'position'"):
         holdout.check_signals(found, here, held)

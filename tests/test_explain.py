@@ -12,6 +12,7 @@ import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
 from jaxfric.explanation import (
+    acceptance,
     candidates,
     contest,
     curves,
@@ -22,16 +23,17 @@ from jaxfric.explanation import (
     improvement,
     intervals,
     locate,
-    naming,
     outstanding,
     parameters,
-    plausible,
+    physical_constraints,
     predictions,
     problem,
     regression,
     reported,
+    selection,
     significance,
     spectral_lines,
+    stepwise,
     structure,
     timing,
     verdict,
@@ -247,7 +249,7 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
 
     def overlooked(run):
         posed = problem.problem_of(run, gaussian)
-        nothing = naming.Named(posed.base, posed.base, [], contest.Contest([], [], 200.0))
+        nothing = selection.Selection(posed.base, posed.base, [], contest.Contest([], [], 200.0))
         return timing.overlooked(run, posed, nothing)
 
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -30))
@@ -288,12 +290,12 @@ def test_of_the_rest_only_noise_is_made_up_for_what_undoing_a_lag_takes_of_it(he
 
 def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypatch):
     now = types.SimpleNamespace(energy=1.0)
-    monkeypatch.setattr(naming, "_alike", lambda finalist, now, view, *_: view == "between")
+    monkeypatch.setattr(acceptance, "_alike", lambda finalist, now, view, *_: view == "between")
 
     def confirmed(term, gain, between="between"):
         trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
         load = types.SimpleNamespace(trial=trial, energy=1 - gain)
-        return naming._confirmed(load, now, (between, "wide"), 0.03)
+        return acceptance._confirmed(load, now, (between, "wide"), 0.03)
 
     swinging = terms.Compliance(20.0, 0.2)
     assert confirmed(swinging, 0.6) and confirmed(LOAD, 0.6)
@@ -349,7 +351,7 @@ def test_a_tone_returns_in_another_recording_at_any_phase(healthy):
     held = [planted(healthy[1], term, other, beta) for other in ((-1.0, -2.0), (0.5, 1.0))]
     alone = problem.problem_of(run, models.gaussian())
     posed = [problem.with_holdout(alone, each) for each in held]
-    found = naming.search(posed[0].evidence, posed[0].base, posed[0].candidate_set)
+    found = stepwise.select(posed[0])
     assert found.names == {"periodic_disturbance"}
     before, after = (verification.error(now, posed[0].held) for now in (found.base, found.last))
     assert after < 0.3 * before
@@ -493,7 +495,7 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
         posed = problem.problem_of(run, models.named("gaussian"))
         mine = [c for c in posed.candidate_set.candidates if c.effect.name == tone]
         posed.candidate_set.candidates = mine
-        return naming.search(posed.evidence, posed.base, posed.candidate_set).taken
+        return stepwise.select(posed).selected
 
     alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
     (found,) = named(alone)
@@ -532,9 +534,9 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     term, alpha, beta = CASES["cogging"]
     run = planted(healthy[0], term, alpha, beta)
     posed = problem.problem_of(run, models.named("gaussian"))
-    monkeypatch.setattr(naming, "_pruned", lambda evidence, now, taken, size: (posed.base, []))
-    found = naming.search(posed.evidence, posed.base, posed.candidate_set)
-    assert found.taken == []
+    monkeypatch.setattr(stepwise, "_pruned", lambda evidence, now, taken, size: (posed.base, []))
+    found = stepwise.select(posed)
+    assert found.selected == []
 
 
 def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
@@ -605,7 +607,7 @@ def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
     posed = problem.problem_of(run, models.named("gaussian"))
     load, beta = finalist(LOAD)
     load.betas = (*posed.base.betas, beta)
-    assert plausible.plausible(load, posed.base, posed.evidence) is is_one
+    assert physical_constraints.physical(load, posed.base, posed.evidence) is is_one
 
 
 def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
@@ -620,7 +622,7 @@ def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
         now = regression.fit([posed.structure], seen, posed.base.betas[:1], 0)
         alpha, betas = np.array([friction]), (*now.betas, beta)
         found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, betas, alpha)
-        round_ = plausible.machines(contest.Contest([], [found], 100.0), now, seen)
+        round_ = physical_constraints.constrained(contest.Contest([], [found], 100.0), now, seen)
         if kept is None:
             assert not round_.finalists
             continue
@@ -642,14 +644,14 @@ def test_what_lags_is_a_curve_that_is_there(healthy):
         run = planted(healthy[0], lag.trial.candidate.term, (force,))
         posed = problem.problem_of(run, models.named(name))
         lag.betas = (*posed.base.betas, beta)
-        assert plausible.plausible(lag, posed.base, posed.evidence) is there
+        assert physical_constraints.physical(lag, posed.base, posed.evidence) is there
 
 
 def test_a_load_that_rests_is_a_spring_to_the_ground(healthy):
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     load, beta = finalist(terms.DryCompliance(0.5, 0.2, 2.0))
     load.betas = (*posed.base.betas, beta)
-    assert not plausible.plausible(load, posed.base, posed.evidence)
+    assert not physical_constraints.physical(load, posed.base, posed.evidence)
 
 
 def test_a_held_out_recording_of_another_rate_is_seen_through_the_same_kernel(healthy):
@@ -758,7 +760,7 @@ def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
     lacking = dataclasses.replace(healthy[1], source="other.csv")
     candidate = candidates.Candidate(EFFECTS["cross_axis"], terms.CrossAxis(), np.zeros((1, 0)))
     trial = types.SimpleNamespace(candidate=candidate)
-    found = types.SimpleNamespace(taken=[types.SimpleNamespace(trial=trial)])
+    found = types.SimpleNamespace(selected=[types.SimpleNamespace(trial=trial)])
     message = "other.csv lacks 'neighbour_velocity', by which .* cross axis.*Add the signal"
     with pytest.raises(ValueError, match=message):
         holdout.check_signals(found, run, lacking)
@@ -818,7 +820,7 @@ def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
 
 def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
     def least(name, *before, left):
-        return naming.least_gain(EFFECTS[name], [EFFECTS[n] for n in before], 1.0, left)
+        return acceptance.least_gain(EFFECTS[name], [EFFECTS[n] for n in before], 1.0, left)
 
     assert least("gain_asymmetry", "spring", left=0.5) == 0.01
     assert least("gain_asymmetry", "spring", left=0.004) == pytest.approx(0.004 / 3)
@@ -831,8 +833,8 @@ def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
     assert least("backlash", "spring", left=0.004) == pytest.approx(0.003)
     # Once a delay is undone nothing of its own is left.
     after = EFFECTS["thermal_drift"], [EFFECTS["actuator_lag"]]
-    assert naming.least_gain(*after, 1.0, 1.5e-4) == 1e-4
-    assert naming.least_gain(*after, 1.0, 1.5e-4, floor=0.0) == pytest.approx(0.5e-4)
+    assert acceptance.least_gain(*after, 1.0, 1.5e-4) == 1e-4
+    assert acceptance.least_gain(*after, 1.0, 1.5e-4, floor=0.0) == pytest.approx(0.5e-4)
 
 
 def test_the_moments_of_pushes_have_their_price():
@@ -900,7 +902,7 @@ def beside(posed, term):
     """A search that has found that term, fitted beside the base, and what it is taken to be."""
     betas = (*posed.base.betas, np.asarray(term.beta()))
     last = regression.fit((*posed.base.terms, term), posed.evidence, betas, 0)
-    return naming.Named(posed.base, last, [naming.Taken(None, (), 0.002)], None)
+    return selection.Selection(posed.base, last, [selection.SelectedTerm(None, (), 0.002)], None)
 
 
 @pytest.mark.parametrize("size", [0.0, 1.0])
@@ -908,7 +910,7 @@ def beside(posed, term):
 def test_a_finding_is_not_nil_within_its_error(healthy, term, size):
     posed = problem.problem_of(planted(healthy[0], term, (size,)), models.named("gaussian"))
     found = beside(posed, term).last
-    nil = list(plausible.nil(found, 1, posed.evidence, posed.wide))
+    nil = list(physical_constraints.nil(found, 1, posed.evidence, posed.wide))
     assert nil == ([0] if size == 0.0 else [])
 
 
@@ -921,11 +923,11 @@ def test_where_a_finding_is_nil_others_compete(healthy, monkeypatch):
         known.append(count)
         return iter([0] if len(known) == 1 else [])
 
-    monkeypatch.setattr(naming, "nil", nil)
-    found = naming.search(posed.evidence, posed.base, posed.candidate_set)
+    monkeypatch.setattr(stepwise, "nil", nil)
+    found = stepwise.select(posed)
     # The form of cogging that went does not come again; another form or effect may.
-    assert known and len(found.last.terms) == 1 + len(found.taken)
-    assert not any(t.trial.candidate.term == terms.Cogging() for t in found.taken)
+    assert known and len(found.last.terms) == 1 + len(found.selected)
+    assert not any(t.trial.candidate.term == terms.Cogging() for t in found.selected)
 
 
 def test_a_dead_band_is_crossed_when_the_command_crosses():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxfric import Recording, explain
-from jaxfric.explanation import evidence, naming, regression, reversals, search
+from jaxfric.explanation import evidence, regression, reversals, search, stepwise
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.problem import across_reversals, problem_of
 from jaxfric.models import named
@@ -121,22 +121,22 @@ def searched(recording):
 
 
 def names(found):
-    return [taken.trial.candidate.effect.name for taken in found.taken]
+    return [taken.trial.candidate.effect.name for taken in found.selected]
 
 
 def test_what_does_not_act_at_reversals_is_found_without_them():
     problem, found = searched(hilly())
     assert problem.reversals and not problem.in_slip.reversals
-    assert names(found.start) == ["cogging"] and names(found)[0] == "cogging"
-    assert all(EFFECTS[name].at_reversals for name in names(found)[1:]) and len(found.taken) > 1
+    assert names(found.in_slip) == ["cogging"] and names(found)[0] == "cogging"
+    assert all(EFFECTS[name].at_reversals for name in names(found)[1:]) and len(found.selected) > 1
     # Of the reversals, it is no start for another search.
-    last, taken = naming._elsewhere(found)
-    assert names(types.SimpleNamespace(taken=taken)) == ["cogging"]
-    assert len(last.terms) == len(last.betas) == len(last.alphas) == 1 + len(taken)
+    last, selected = stepwise.elsewhere(found)
+    assert names(types.SimpleNamespace(selected=selected)) == ["cogging"]
+    assert len(last.terms) == len(last.betas) == len(last.alphas) == 1 + len(selected)
 
 
 def test_an_axis_that_sticks_is_asked_once():
     recording = sticking()
     problem, found = searched(recording)
-    assert not problem.reversals and found.start is None
+    assert not problem.reversals and found.in_slip is None
     assert across_reversals(recording, problem) is None

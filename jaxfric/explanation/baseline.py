@@ -13,8 +13,8 @@ from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from . import parameters as spelled
+from .acceptance import LEAST_SHARE, LINEARITY
 from .evidence import Evidence
-from .naming import LEAST_SHARE, LINEARITY
 from .predictions import with_predictions
 from .regression import RANK, Fit, fit, orthonormal, solve
 from .significance import LEVEL, BlockBootstrap, blocks
@@ -100,38 +100,40 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     return start._replace(columns=columns, residual=left, energy=float(left @ left))
 
 
-def as_given(model: Model, now: Fit, evidence: Evidence, free: tuple[int, ...] = ()) -> Fit:
+def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ...] = ()) -> Fit:
     """A fit with its base, the first term, at the model's own values, the others fitted beside.
 
     `free`: parameters of the base that are fitted too, numbers among affine and nonlinear ones. The
     derivatives are those of all parameters, which say what these values are worth.
     """
-    given, others = at_values(model, evidence), now.terms[1:]
+    given, others = at_values(model, evidence), current.terms[1:]
     count = len(given.alphas[0])
     searched = given.betas[0].copy()
     for i in free:
         if i >= count:
-            searched[i - count] = now.betas[0][i - count]
+            searched[i - count] = current.betas[0][i - count]
     kept = [i for i in range(count) if i not in free]
     for _ in range(2):  # some terms act on what the others predict
-        seen = with_predictions(evidence, now)
+        seen = with_predictions(evidence, current)
         if others and not free:
             beside = seen._replace(target=given.residual)
-            now = now._replace(betas=(searched, *fit(others, beside, now.betas[1:], 6).betas))
-        now = fit(now.terms, seen, (searched, *now.betas[1:]), 0)
-        alpha = np.zeros(now.columns.shape[1])
+            current = current._replace(
+                betas=(searched, *fit(others, beside, current.betas[1:], 6).betas)
+            )
+        current = fit(current.terms, seen, (searched, *current.betas[1:]), 0)
+        alpha = np.zeros(current.columns.shape[1])
         alpha[kept] = given.alphas[0][kept]
         open_ = [i for i in range(len(alpha)) if i not in kept]
-        alpha[open_] = solve(now.columns[:, open_], seen.target - now.columns @ alpha)
-        left = seen.target - now.columns @ alpha
-        ends = np.cumsum([len(a) for a in now.alphas])[:-1]
-        now = now._replace(
-            betas=(searched, *now.betas[1:]),
+        alpha[open_] = solve(current.columns[:, open_], seen.target - current.columns @ alpha)
+        left = seen.target - current.columns @ alpha
+        ends = np.cumsum([len(a) for a in current.alphas])[:-1]
+        current = current._replace(
+            betas=(searched, *current.betas[1:]),
             alphas=tuple(np.split(alpha, ends)),
             residual=left,
             energy=float(left @ left),
         )
-    return now
+    return current
 
 
 # More wrong values than this are another machine.
@@ -192,8 +194,8 @@ def _different(
     names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
     units = dict(model.units)
     while 1 < len(free) <= MOST_WRONG:
-        now = as_given(model, refitted, evidence, tuple(free))
-        values = spelled.estimates(freed(now, free), block, units)[0]
+        current = as_given(model, refitted, evidence, tuple(free))
+        values = spelled.estimates(freed(current, free), block, units)[0]
         before = [*model.alpha, *model.term.beta()]
         away = {
             i: abs(float(values[names[i]].value) - float(before[i]))
@@ -207,13 +209,13 @@ def _different(
     return free
 
 
-def freed(now: Fit, free: Iterable[int]) -> Fit:
+def freed(current: Fit, free: Iterable[int]) -> Fit:
     """A fit of whose base only some values were fitted; what stayed has no error."""
-    kept, columns, slopes = set(free), now.columns.copy(), now.slopes.copy()
-    count, searched = len(now.alphas[0]), len(now.betas[0])
+    kept, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
+    count, searched = len(current.alphas[0]), len(current.betas[0])
     columns[:, [i for i in range(count) if i not in kept]] = 0.0
     slopes[:, [i for i in range(searched) if count + i not in kept]] = 0.0
-    return now._replace(columns=columns, slopes=slopes)
+    return current._replace(columns=columns, slopes=slopes)
 
 
 def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:

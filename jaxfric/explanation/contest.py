@@ -39,6 +39,11 @@ class Trial(NamedTuple):
     threshold: float
     new_part: float
 
+    @property
+    def effect(self) -> Effect:
+        """The effect of the term."""
+        return self.candidate.effect
+
     def score(self, gain: float, size: float) -> float:
         """Half the log-likelihood ratio, less the price of the parameters (Schwarz 1978).
 
@@ -61,6 +66,11 @@ class Finalist(NamedTuple):
     betas: tuple[np.ndarray, ...]
     alpha: np.ndarray
 
+    @property
+    def effect(self) -> Effect:
+        """The effect of the candidate."""
+        return self.trial.effect
+
 
 class Contest(NamedTuple):
     """One round: every candidate on the grid, and the finalists refitted with the whole model.
@@ -75,7 +85,7 @@ class Contest(NamedTuple):
 
 def contest(
     evidence: Evidence,
-    now: Fit,
+    current: Fit,
     field: CandidateSet,
     seed: int = 0,
     among: Callable[[Effect], bool] = lambda effect: True,
@@ -86,7 +96,7 @@ def contest(
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
-    bootstrap = BlockBootstrap(now, block, seed)
+    bootstrap = BlockBootstrap(current, block, seed)
 
     def scanned(candidate: Candidate) -> tuple[Scan, np.ndarray]:
         raw = field.columns(candidate, seen)
@@ -103,9 +113,9 @@ def contest(
             field.candidates, best, scans, p_values, least, strict=True
         )
     ]
-    fast = fast_tone(seen, now)
+    fast = fast_tone(seen, current)
     loud = [c for effect, term in tones(seen) for c in at_frequencies(effect, term, fast)]
-    for candidate in [*outstanding(seen, now), *loud]:
+    for candidate in [*outstanding(seen, current), *loud]:
         raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events, nor about a line among thousands: what
         # stands out has been tested.
@@ -115,8 +125,8 @@ def contest(
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
-    eligible = [t for t in trials if among(t.candidate.effect)]
-    return Contest(trials, _finals(seen, now, eligible, size), size)
+    eligible = [t for t in trials if among(t.effect)]
+    return Contest(trials, _finals(seen, current, eligible, size), size)
 
 
 def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
@@ -129,11 +139,11 @@ def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
     )  # fmt: skip
 
 
-def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[Finalist]:
-    basis = now.basis()
+def _finals(seen: Evidence, current: Fit, trials: list[Trial], size: float) -> list[Finalist]:
+    basis = current.basis()
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     # A sharp term may not be confirmed, and must not keep the next best from being looked at.
-    blunt = [t for t in trials if not t.candidate.effect.sharp]
+    blunt = [t for t in trials if not t.effect.sharp]
     leader = (blunt or trials)[0]
     enough = 0.5 * leader.score(leader.gain, size) - RIVAL
 
@@ -141,16 +151,16 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
         number, trial = numbered
         found = None
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
-            found = _refined(seen, now, trial, basis)
-        if bent and _imitated(trial, now):
-            again = _afresh(seen, now, trial)
+            found = _refined(seen, current, trial, basis)
+        if bent and _imitated(trial, current):
+            again = _afresh(seen, current, trial)
             found = again if found is None or again.energy < found.energy else found
         if found is not None and _overshadowed(trial, found.alpha):
             trial = _overtone(trial, found)
-            found = _refined(seen, now, trial, basis)
+            found = _refined(seen, current, trial, basis)
         if found is None or not _sensible(trial, found.alpha):
             return None
-        gain = 1 - found.energy / now.energy
+        gain = 1 - found.energy / current.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
         return found._replace(score=trial.score(gain, size), p_value=p_value)
@@ -161,7 +171,7 @@ def _finals(seen: Evidence, now: Fit, trials: list[Trial], size: float) -> list[
 
 def _sensible(trial: Trial, alpha: np.ndarray) -> bool:
     """Whether magnitudes are positive."""
-    return not (trial.candidate.effect.positive and np.any(alpha < 0))
+    return not (trial.effect.positive and np.any(alpha < 0))
 
 
 def _overshadowed(trial: Trial, alpha: np.ndarray) -> bool:
@@ -187,24 +197,24 @@ def _overtone(trial: Trial, found: Finalist) -> Trial:
     return trial._replace(candidate=alone, beta=beta, dimension=2, p_value=1.0)
 
 
-def _refined(seen, now, trial, basis) -> Finalist:
+def _refined(seen, current, trial, basis) -> Finalist:
     """The candidate refined, the rest of the model fitted along to first order."""
     found = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
-    betas = (*now.betas, found.betas[0])
+    betas = (*current.betas, found.betas[0])
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
 
 
 _SPEED = frozenset({"velocity"})
 
 
-def _imitated(trial: Trial, now: Fit) -> bool:
+def _imitated(trial: Trial, current: Fit) -> bool:
     """Whether the base may have bent its own curve in velocity to what the candidate is."""
     velocity = trial.candidate.term.coordinates <= _SPEED and len(trial.beta) < 2
-    return velocity and bool(now.terms[0].nonlinear)
+    return velocity and bool(current.terms[0].nonlinear)
 
 
-def _afresh(seen, now, trial) -> Finalist:
+def _afresh(seen, current, trial) -> Finalist:
     """The whole model with the candidate, the base's nonlinear parameters looked for anew."""
-    terms = (*now.terms, trial.candidate.term)
-    found = fit(terms, seen, [None, *now.betas[1:], trial.beta], 8)
+    terms = (*current.terms, trial.candidate.term)
+    found = fit(terms, seen, [None, *current.betas[1:], trial.beta], 8)
     return Finalist(0.0, trial, 1.0, found.energy, found.betas, found.alphas[-1])

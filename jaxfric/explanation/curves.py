@@ -104,11 +104,11 @@ def _friction(models: tuple[Model, Model], evidence: Evidence, after: Fit) -> di
         error += bins.error(left).tolist()
     velocity = np.concatenate(parts) if parts else np.zeros(0)
     curves = (np.asarray(model.friction(velocity)).tolist() for model in models)
-    before, now = ([v if np.isfinite(v) else None for v in curve] for curve in curves)
+    before, after_ = ([v if np.isfinite(v) else None for v in curve] for curve in curves)
     return {
         "velocity": velocity.tolist(),
         "before": before,
-        "after": now,
+        "after": after_,
         "at": at,
         "measured": measured,
         "error": error,

@@ -23,26 +23,26 @@ HALF_WIDTH = 2.0
 UNDESCRIBED = 0.5
 
 
-def drives(now: Fit, evidence: Evidence, block: np.ndarray) -> bool:
+def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     """Whether friction drives the axis instead of braking it, beyond its interval.
 
     Half the difference of the mean friction forward and backward, by the speeds that were seen:
     a constant load, which terms that know the direction take up, cancels. The slower and the
     faster half each count, since a line through both may be negative where nothing moved.
     """
-    places = _friction(now)
+    places = _friction(current)
     if not places:
         return False
-    matrix = covariance(now, block)
+    matrix = covariance(current, block)
     speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
     slow = speed <= np.median(speed)
-    alpha = np.concatenate(now.alphas)
+    alpha = np.concatenate(current.alphas)
     for half in (slow, ~slow):
         forward, backward = half & (evidence.side > 0), half & (evidence.side < 0)
         if not (forward.any() and backward.any()):
             continue
         weights = np.zeros(len(matrix))
-        columns = now.columns[:, places]
+        columns = current.columns[:, places]
         weights[places] = (columns[forward].mean(axis=0) - columns[backward].mean(axis=0)) / 2
         seen = np.flatnonzero(weights)
         spread = matrix[np.ix_(seen, seen)]
@@ -54,10 +54,10 @@ def drives(now: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     return False
 
 
-def _friction(now: Fit) -> list[int]:
+def _friction(current: Fit) -> list[int]:
     """The places, among all affine parameters, of friction as a function of velocity alone."""
     places, start = list[int](), 0
-    leaves = (leaf for term in now.terms for leaf in summands(term))
+    leaves = (leaf for term in current.terms for leaf in summands(term))
     for leaf in leaves:
         if leaf.coordinates == {"velocity"}:
             places += range(start, start + len(leaf.affine))
@@ -169,15 +169,17 @@ def _plain_axis(evidence: Evidence) -> np.ndarray:
     return matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
 
 
-def doubts(now: Fit, view: Problem, parameters: dict[str, Estimate], error: float) -> list[Remark]:
+def doubts(
+    current: Fit, view: Problem, parameters: dict[str, Estimate], error: float
+) -> list[Remark]:
     """What makes the model that is reported impossible for an axis.
 
-    **Arguments:** `now`, its fit, on the rows of `view`; `parameters` of its base, with all their
-    errors; `error`: its filtered force error.
+    **Arguments:** `current`, its fit, on the rows of `view`; `parameters` of its base, with all
+    their errors; `error`: its filtered force error.
     """
     remarks = []
     wrong = ["inertia"] * accelerates(parameters)
-    wrong += ["friction"] * drives(now, view.evidence, view.block)
+    wrong += ["friction"] * drives(current, view.evidence, view.block)
     if wrong and not _corrects(view.evidence):
         remarks.append(
             Remark(

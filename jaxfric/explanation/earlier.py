@@ -10,11 +10,11 @@ import numpy as np
 
 from ..data.recording import Recording
 from . import parameters as spelled, verification
+from .acceptance import LEAST_SHARE
 from .baseline import SURE, Baseline, Mismatch
 from .evidence import Evidence
 from .findings import Solution
 from .locate import locate
-from .naming import LEAST_SHARE
 from .predictions import PREDICTED, with_predictions
 from .regression import Fit, fit
 from .structure import significant

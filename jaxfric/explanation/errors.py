@@ -105,13 +105,13 @@ def _adjusted(findings: Findings) -> dict[str, list[str]]:
     there = verification.carried(selection.last, problem.held, selection.rephased)
     adjusted: dict[str, list[str]] = {"left_out": [], "rephased": []}
     known = {id(term): alpha for term, alpha in zip(there.terms, there.alphas, strict=True)}
-    for number, taken in enumerate(selection.taken):
+    for number, selected in enumerate(selection.selected):
         index = selection.term_index(number)
         term, alpha = selection.last.terms[index], selection.last.alphas[index]
         if id(term) not in known:
-            adjusted["left_out"].append(taken.trial.candidate.effect.name)
+            adjusted["left_out"].append(selected.effect.name)
         elif not np.array_equal(known[id(term)], alpha):
-            adjusted["rephased"].append(taken.trial.candidate.effect.name)
+            adjusted["rephased"].append(selected.effect.name)
     return adjusted
 
 

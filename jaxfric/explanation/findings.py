@@ -6,17 +6,17 @@ from typing import NamedTuple
 import numpy as np
 
 from . import verification
-from .naming import Named, Taken
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fit
+from .selection import SelectedTerm, Selection
 
 
 class Solution(NamedTuple):
     """A regression problem and the terms selected in it."""
 
     problem: Problem
-    selection: Named
+    selection: Selection
 
     def fit_without(self, number: int) -> Fit:
         """The model refitted without the selected term of that number."""
@@ -25,9 +25,9 @@ class Solution(NamedTuple):
 
     def without(self, number: int) -> "Solution":
         """Without the selected term of that number, the others refitted."""
-        taken = _but(self.selection.taken, number)
-        last = self.fit_without(number) if taken else self.selection.base
-        return self._replace(selection=self.selection._replace(last=last, taken=taken))
+        selected = _but(self.selection.selected, number)
+        last = self.fit_without(number) if selected else self.selection.base
+        return self._replace(selection=self.selection._replace(last=last, selected=selected))
 
 
 class Findings(NamedTuple):
@@ -47,27 +47,27 @@ class Findings(NamedTuple):
         return self.recorded.problem
 
     @property
-    def selection(self) -> Named:
+    def selection(self) -> Selection:
         """The terms selected in that problem."""
         return self.recorded.selection
 
     def examined_in(self, number: int) -> Solution:
         """Where a finding is compared with all the others: a delay or lag as recorded."""
-        late = number == len(self.undelayed.selection.taken)
+        late = number == len(self.undelayed.selection.selected)
         return self.recorded if late else self.undelayed
 
-    def with_taken(self, taken: Sequence[Taken]) -> "Findings":
+    def with_selected(self, selected: Sequence[SelectedTerm]) -> "Findings":
         """With something else said of the same terms."""
         recorded, undelayed = (
-            each._replace(selection=each.selection._replace(taken=list(taken[:count])))
+            each._replace(selection=each.selection._replace(selected=list(selected[:count])))
             for each in self
-            for count in (len(each.selection.taken),)
+            for count in (len(each.selection.selected),)
         )
         return Findings(recorded, undelayed)
 
     def at_base(self, base: Fit) -> "Findings":
         """No findings: that fit of the baseline alone."""
-        return alone(Solution(self.problem, self.selection._replace(last=base, taken=[])))
+        return alone(Solution(self.problem, self.selection._replace(last=base, selected=[])))
 
     def fit_without(self, number: int) -> Fit:
         """The model without one of the findings, the others refitted.
@@ -78,18 +78,18 @@ class Findings(NamedTuple):
 
     def without(self, number: int) -> "Findings":
         """The findings without one of them, the others refitted."""
-        count = len(self.undelayed.selection.taken)
-        if len(self.selection.taken) == count or number == count:
+        count = len(self.undelayed.selection.selected)
+        if len(self.selection.selected) == count or number == count:
             return alone(self.recorded.without(number))
         undelayed = self.undelayed.without(number)
         last, others = self.selection.last, undelayed.selection.last
         late, beta, alpha = last.terms[-1], last.betas[-1], last.alphas[-1]
         seen = with_predictions(self.problem.evidence, others)
-        now = fit((*others.terms, late), seen, [*others.betas, beta], 0)
-        now = now._replace(alphas=(*others.alphas, alpha), betas=(*others.betas, beta))
-        taken = _but(self.selection.taken, number)
-        recorded = self.recorded._replace(selection=self.selection._replace(last=now, taken=taken))
-        return Findings(recorded, undelayed)
+        current = fit((*others.terms, late), seen, [*others.betas, beta], 0)
+        current = current._replace(alphas=(*others.alphas, alpha), betas=(*others.betas, beta))
+        selected = _but(self.selection.selected, number)
+        selection = self.selection._replace(last=current, selected=selected)
+        return Findings(Solution(self.problem, selection), undelayed)
 
     def with_late(self, current: Fit) -> Fit:
         """A fit with the force put back, with the delay or lag itself where there is one."""
@@ -118,5 +118,5 @@ def alone(solution: Solution) -> Findings:
     return Findings(solution, solution)
 
 
-def _but(values: Sequence[Taken], number: int) -> list[Taken]:
+def _but(values: Sequence[SelectedTerm], number: int) -> list[SelectedTerm]:
     return [value for i, value in enumerate(values) if i != number]

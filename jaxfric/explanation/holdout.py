@@ -11,16 +11,16 @@ from .figures import Figures
 from .findings import Findings, Solution
 from .improvement import Improved, errors_of_base, force_errors
 from .motion import Motion
-from .naming import Named
 from .problem import with_holdout
+from .selection import Selection
 from .uncertainty import estimated
 
 
-def check_signals(selection: Named, recording: Recording, holdout: Recording) -> None:
+def check_signals(selection: Selection, recording: Recording, holdout: Recording) -> None:
     """Raise `ValueError` if a finding reads a signal that the held-out recording lacks."""
     ours, theirs = _signals(recording), _signals(holdout)
-    for taken in selection.taken:
-        candidate = taken.trial.candidate
+    for selected in selection.selected:
+        candidate = selected.trial.candidate
         for signal in sorted((candidate.term.coordinates & ours) - theirs):
             effect = candidate.effect.name.replace("_", " ")
             raise ValueError(
@@ -49,20 +49,20 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
         for number, nil in enumerate(_nil_in_both(findings))
         for each in (_borne_out(findings, number),)
     ]
-    findings = findings.with_taken([
-        taken._replace(confirmed=each)
-        for taken, each in zip(findings.selection.taken, borne, strict=True)
+    findings = findings.with_selected([
+        selected._replace(confirmed=each)
+        for selected, each in zip(findings.selection.selected, borne, strict=True)
     ])  # fmt: skip
     better = better._replace(claimed=findings)
     better = _refuting(better, findings, [n for n, each in enumerate(borne) if each is False])
     better = _measured(better, figures)
     tested = tuple(n for n, each in enumerate(borne) if each is not None)
     if better.after.worse(better.before, figures.rounding) and tested != better.refuted:
-        borne_out = better.findings.selection.taken
-        others = [n for n, taken in enumerate(borne_out) if taken.confirmed]
+        borne_out = better.findings.selection.selected
+        others = [n for n, selected in enumerate(borne_out) if selected.confirmed]
         better = _refuting(better, better.findings, others)._replace(refuted=tested)
         better = _measured(better, figures)
-    if better.findings.selection.taken and better.after.worse(better.before, figures.rounding):
+    if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
         better = _measured(_at_base_values(better), figures)
     if better.after.worse(better.before, figures.rounding):
         base, every = findings.at_base(better.first), tuple(range(len(borne)))
@@ -75,7 +75,7 @@ def _with_rows(findings: Findings, holdout: Motion) -> Findings:
     """The findings with the held-out recording's rows, its force put back where it acts late."""
     (problem, selection), (_, others) = findings
     recorded = Solution(with_holdout(problem, holdout), selection)
-    if selection.undone is None or len(selection.taken) == len(others.taken):
+    if selection.undone is None or len(selection.selected) == len(others.selected):
         return Findings(recorded, Solution(recorded.problem, others))
     undone = with_holdout(findings.undelayed.problem, selection.undone(holdout))
     return Findings(recorded, Solution(undone, others))
@@ -109,7 +109,7 @@ def _measured(better: Improved, figures: Figures) -> Improved:
     """With the errors of both models on both recordings, over the same samples."""
     findings = better.findings
     before = errors_of_base(findings.at_base(better.first), findings, figures)
-    alike = not findings.selection.taken and not better.refitted
+    alike = not findings.selection.selected and not better.refitted
     after = before if alike else force_errors(findings, figures)
     return better._replace(before=before, after=after)
 
@@ -120,13 +120,13 @@ def _rephased(findings: Findings) -> Findings:
     The zero of an incremental encoder is another after each homing.
     """
     selection = findings.undelayed.selection
-    for number in range(len(selection.taken)):
+    for number in range(len(selection.selected)):
         wave = verification.wavelike(selection.last, selection.term_index(number))
         if not wave or _borne_out(findings, number):
             continue
-        turned = findings.with_taken([
-            taken._replace(rephased=taken.rephased or n == number)
-            for n, taken in enumerate(findings.selection.taken)
+        turned = findings.with_selected([
+            selected._replace(rephased=selected.rephased or n == number)
+            for n, selected in enumerate(findings.selection.selected)
         ])  # fmt: skip
         if _borne_out(turned, number):
             findings = turned
@@ -138,7 +138,7 @@ def _borne_out(findings: Findings, number: int) -> bool | None:
 
     `None` for what no other recording can say.
     """
-    if findings.selection.taken[number].trial.candidate.effect.momentary:
+    if findings.selection.selected[number].effect.momentary:
         return None
     less = findings.fit_without(number)
     without, with_it = findings.holdout_residuals(less, number)
@@ -149,6 +149,6 @@ def _nil_in_both(findings: Findings) -> list[bool]:
     """Whether each finding's force may as well be none, by what both recordings say of it."""
     selection = findings.selection
     start = selection.term_index(0)
-    values = estimated(findings)[start:] if selection.taken else []
+    values = estimated(findings)[start:] if selection.selected else []
     terms = selection.last.terms[start:]
     return [spelled.may_be_none(*pair) for pair in zip(terms, values, strict=True)]

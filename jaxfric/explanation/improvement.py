@@ -8,9 +8,9 @@ from ..models import Model
 from ..simulation.prediction import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled, verification
+from .acceptance import LEAST_SHARE
 from .figures import Figures
 from .findings import Findings
-from .naming import LEAST_SHARE
 from .regression import Fit
 
 
@@ -66,8 +66,8 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
     spoilt = None
     while True:
         before = errors_of_base(base, findings, figures)
-        taken = findings.selection.taken
-        after = before if not (taken or refitted) else force_errors(findings, figures)
+        selected = findings.selection.selected
+        after = before if not (selected or refitted) else force_errors(findings, figures)
         if not after.worse(before, figures.rounding):
             less = None if spoilt is None else _without_idle(findings)
             if less is None:
@@ -75,10 +75,10 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
             findings = less
             continue
         spoilt = spoilt or after
-        if not taken:
+        if not selected:
             findings, refitted = base, False
             continue
-        fewer = (findings.without(n) for n in range(len(taken)))
+        fewer = (findings.without(n) for n in range(len(selected)))
         findings = min(fewer, key=lambda some: _here(some, figures))
     dropped = _dropped(claimed, findings)
     if spoilt is not None and not dropped:
@@ -89,8 +89,7 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
 def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
     """Effects of which there are fewer findings than before."""
     names, others = (
-        [taken.trial.candidate.effect.name for taken in some.selection.taken]
-        for some in (before, after)
+        [selected.effect.name for selected in some.selection.selected] for some in (before, after)
     )
     return tuple(dict.fromkeys(n for n in names if names.count(n) > others.count(n)))
 
@@ -98,7 +97,7 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
 def _without_idle(findings: Findings) -> Findings | None:
     """Without a finding that by itself removes too little, once one beside it was dropped."""
     energy = findings.undelayed.selection.last.energy
-    for number in range(len(findings.selection.taken)):
+    for number in range(len(findings.selection.selected)):
         less = findings.without(number)
         if 1 - energy / less.undelayed.selection.last.energy < LEAST_SHARE:
             return less

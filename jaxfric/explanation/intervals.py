@@ -5,7 +5,7 @@ import numpy as np
 from .regression import Fit, orthonormal
 
 
-def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
+def covariance(current: Fit, block: np.ndarray) -> np.ndarray:
     """Covariance of all parameters, affine ones first, `(P, P)`; infinite where not visible.
 
     The sandwich of block scores, each block freed of its own pull on the fit: the delete-one-block
@@ -13,7 +13,7 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
 
     **Arguments:** `block`, the number of each row's block, `(J,)`.
     """
-    jacobian = now.jacobian
+    jacobian = current.jacobian
     size = np.sqrt(np.sum(jacobian**2, axis=0))
     scaled = jacobian / np.where(size > 0, size, 1.0)
     left, values, right = np.linalg.svd(scaled, full_matrices=False)
@@ -22,7 +22,7 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
     back = (right[seen].T / values[seen]) / np.where(size > 0, size, 1.0)[:, None]
     hidden = np.sqrt(np.sum(right[~seen] ** 2, axis=0)) > 1e-3
     starts = np.flatnonzero(np.diff(block, prepend=-1))
-    scores = np.add.reduceat(white * now.residual[:, None], starts, axis=0)
+    scores = np.add.reduceat(white * current.residual[:, None], starts, axis=0)
     count = white.shape[1]
     grams = np.stack([
         white[a:b].T @ white[a:b]
@@ -36,7 +36,7 @@ def covariance(now: Fit, block: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def left_out(now: Fit, number: int, block: np.ndarray) -> float:
+def left_out(current: Fit, number: int, block: np.ndarray) -> float:
     """The energy that blocks are left with, N², by a term that was fitted to all the others.
 
     To first order in the term's own parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks);
@@ -45,16 +45,16 @@ def left_out(now: Fit, number: int, block: np.ndarray) -> float:
 
     **Arguments:** `number` of the term; `block`, the number of each row's block, `(J,)`.
     """
-    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
-    mine = np.zeros(now.jacobian.shape[1], bool)
+    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
+    mine = np.zeros(current.jacobian.shape[1], bool)
     mine[affine[number] : affine[number + 1]] = True
     mine[searched[number] : searched[number + 1]] = True
-    basis = orthonormal(now.jacobian[:, mine], orthonormal(now.jacobian[:, ~mine]))
+    basis = orthonormal(current.jacobian[:, mine], orthonormal(current.jacobian[:, ~mine]))
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     power = 0.0
     for a, b in zip(starts, [*starts[1:], len(block)], strict=True):
-        own, left = basis[a:b], now.residual[a:b]
+        own, left = basis[a:b], current.residual[a:b]
         pull = np.eye(own.shape[1]) - 0.95 * own.T @ own
         power += float(np.sum((left + own @ np.linalg.solve(pull, own.T @ left)) ** 2))
     return power

@@ -10,22 +10,22 @@ from .regression import Fit
 from .significance import LEVEL
 
 
-def outstanding(evidence: Evidence, now: Fit) -> list[Candidate]:
+def outstanding(evidence: Evidence, current: Fit) -> list[Candidate]:
     """What stands out of a residual, of each effect that is not in the fit its best law."""
     if not evidence.clock:
         return []
-    known = {traits(term).name for term in now.terms}
-    left = _residual(evidence, now)
+    known = {traits(term).name for term in current.terms}
+    left = _residual(evidence, current)
     others = [effect for effect in EFFECTS.values() if effect.name not in known]
-    best = (_best(effect, left, evidence, now) for effect in others)
+    best = (_best(effect, left, evidence, current) for effect in others)
     return [candidate for candidate in best if candidate is not None]
 
 
-def _residual(evidence: Evidence, now: Fit) -> Residual:
+def _residual(evidence: Evidence, current: Fit) -> Residual:
     clock = np.asarray(evidence.motion.time)
     run, velocity = evidence.elapsed[: evidence.nodes], np.asarray(evidence.motion.velocity)
     return Residual(
-        values=now.residual,
+        values=current.residual,
         time=clock[evidence.centre],
         elapsed=evidence.elapsed[evidence.centre],
         reach=evidence.reach,
@@ -36,12 +36,14 @@ def _residual(evidence: Evidence, now: Fit) -> Residual:
     )
 
 
-def _best(effect: Effect, left: Residual, evidence: Evidence, now: Fit) -> Candidate | None:
+def _best(effect: Effect, left: Residual, evidence: Evidence, current: Fit) -> Candidate | None:
     most, found = 0.0, None
     for term in effect.outstanding(left):
         candidate = Candidate(effect, term, np.zeros((1, 0)))
         columns = candidate.columns(evidence)[0]
-        gain = now.residual @ columns @ np.linalg.lstsq(columns, now.residual, rcond=1e-9)[0]
+        gain = (
+            current.residual @ columns @ np.linalg.lstsq(columns, current.residual, rcond=1e-9)[0]
+        )
         if gain > most:
             most, found = gain, candidate
     return found

@@ -17,30 +17,30 @@ from .predictions import with_predictions
 from .regression import Fit, fit
 
 
-def whole(now: Fit) -> AbstractTerm:
+def whole(current: Fit) -> AbstractTerm:
     """All the terms of a fit as one sum, their β in place."""
     known = [
         t.with_beta(jnp.asarray(b)) if len(b) else t
-        for t, b in zip(now.terms, now.betas, strict=True)
+        for t, b in zip(current.terms, current.betas, strict=True)
     ]
     return Sum(tuple(leaf for term in known for leaf in summands(term)))
 
 
-def model(now: Fit, units) -> Model:
+def model(current: Fit, units) -> Model:
     """The fit as a model."""
-    return Model(whole(now), jnp.asarray(np.concatenate(now.alphas)), units)
+    return Model(whole(current), jnp.asarray(np.concatenate(current.alphas)), units)
 
 
-def estimates(now: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
+def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
     """The parameters of each term of a fit, waves by amplitude and phase too."""
-    matrix = covariance(now, block)
+    matrix = covariance(current, block)
     freedom = max(int(block[-1]) + 1 - matrix.shape[0] // 2, 3)
-    affine = np.cumsum([0, *(len(a) for a in now.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in now.betas)])
+    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
+    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
     result = []
-    for n, term in enumerate(now.terms):
+    for n, term in enumerate(current.terms):
         places = [*range(affine[n], affine[n + 1]), *range(searched[n], searched[n + 1])]
-        values = [*now.alphas[n], *now.betas[n]]
+        values = [*current.alphas[n], *current.betas[n]]
         named = {
             p.name: Estimate(
                 np.float64(value),

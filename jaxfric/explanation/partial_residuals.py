@@ -31,13 +31,13 @@ def partial_residuals(better: Improved) -> list[dict[str, Any]]:
     `error`, `law` between `low` and `high`, and the mean residual `before` and `after`.
     """
     pictures = []
-    for number, taken in enumerate(better.findings.selection.taken):
+    for number, selected in enumerate(better.findings.selection.selected):
         problem, selection = better.findings.examined_in(number)
         current, index = selection.last, selection.term_index(number)
         seen = with_predictions(problem.evidence, current)
         law = current.part(index)
         slopes, spread = _parameters(current, index, problem.block)
-        along = _along(taken.trial.candidate.effect.name, current, index, seen)
+        along = _along(selected.effect.name, current, index, seen)
         before = verification.residual(better.first, problem.evidence)
         pictures.append(
             _picture(along, law, current.residual, before) | _band(along, law, slopes, spread)

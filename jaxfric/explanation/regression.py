@@ -58,13 +58,13 @@ class Fit(NamedTuple):
         return self.columns[:, counts[number] : counts[number + 1]] @ self.alphas[number]
 
 
-def fast(now: Fit) -> float:
+def fast(current: Fit) -> float:
     """The root mean square, N, of what a fit leaves and what differs from row to row.
 
     Rows four apart share no samples; their difference is noise and what changes faster than the
     kernel (von Neumann 1941).
     """
-    differences = now.residual[4:] - now.residual[:-4]
+    differences = current.residual[4:] - current.residual[:-4]
     return float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(2))
 
 
@@ -213,10 +213,10 @@ def fit(
     return _refine(terms, rows, space, place, iterations)
 
 
-def without(now: Fit, evidence: Evidence, number: int) -> Fit:
+def without(current: Fit, evidence: Evidence, number: int) -> Fit:
     """A fit done again without one of its terms."""
-    keep = [i for i in range(len(now.terms)) if i != number]
-    return fit([now.terms[i] for i in keep], evidence, [now.betas[i] for i in keep], 6)
+    keep = [i for i in range(len(current.terms)) if i != number]
+    return fit([current.terms[i] for i in keep], evidence, [current.betas[i] for i in keep], 6)
 
 
 def _at(terms, evidence, space, place, derivatives=False) -> Fit:

@@ -31,23 +31,23 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
     selection, evidence = findings.selection, findings.problem.evidence
     values = estimated(findings)[selection.term_index(0) :]
     result, alone = [], []
-    for number, (taken, parameters) in enumerate(zip(selection.taken, values, strict=True)):
-        effect = taken.trial.candidate.effect
+    for number, (selected, parameters) in enumerate(zip(selection.selected, values, strict=True)):
+        effect = selected.effect
         if effect.moment:
             parameters = dated(parameters, effect.moment, evidence)
         share, held = _shares(findings, first, number)
         alone.append(share)
         if twins := _twins(findings, number):
             share, held = _shares(_without(findings, twins), first, number)
-        text = sentence(effect.name, parameters, share, taken.rivals, _extent(evidence))
-        if taken.rephased:
+        text = sentence(effect.name, parameters, share, selected.rivals, _extent(evidence))
+        if selected.rephased:
             text += REPHASED
         if effect.late and evidence.motion.position is None:
             text += f" {NO_POSITION}"
         result.append(
             Finding(
-                effect.name, effect.equation, text, taken.rivals, effect.separate_by, parameters,
-                share, held, taken.p_value, confirmed=taken.confirmed,
+                effect.name, effect.equation, text, selected.rivals, effect.separate_by, parameters,
+                share, held, selected.p_value, confirmed=selected.confirmed,
             )
         )  # fmt: skip
     return result, alone
@@ -72,10 +72,10 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
     errors = np.zeros(len(names)) if known.errors is None else known.errors
     moved = {}
     for i, before in wrong.moved.items():
-        now = values[names[i]]
+        current = values[names[i]]
         if i not in wrong.within:
             moved[names[i]] = Moved(
-                before, now.value, now.standard_error, now.unit, float(errors[i])
+                before, current.value, current.standard_error, current.unit, float(errors[i])
             )
     first = better.first
     held_share = None if held is None else verification.share(first, base, first, held)
@@ -95,7 +95,7 @@ def _twins(findings: Findings, number: int) -> list[int]:
     Two stops that stand for one which stiffens are each nearly all of it without the other. So the
     earlier one is compared without the later, and their shares add up to that of the effect.
     """
-    names = [taken.trial.candidate.effect.name for taken in findings.selection.taken]
+    names = [selected.effect.name for selected in findings.selection.selected]
     return [n for n in reversed(range(number + 1, len(names))) if names[n] == names[number]]
 
 
@@ -124,7 +124,7 @@ def _shares(findings: Findings, first: Fit, number: int) -> tuple[float, float |
     # No more than the base leaves, which refitting in a few steps may miss.
     share = float((min(less.energy, base.energy) - last.energy) / first.energy)
     held = findings.problem.held
-    if held is None or findings.selection.taken[number].trial.candidate.effect.momentary:
+    if held is None or findings.selection.selected[number].effect.momentary:
         return share, None
     without, with_it = findings.holdout_residuals(less, number)
     power = np.sum(verification.residual(first, held) ** 2)

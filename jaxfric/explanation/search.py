@@ -8,8 +8,9 @@ from .baseline import as_given
 from .contest import Contest
 from .findings import Findings, Solution, alone
 from .motion import Motion
-from .naming import Named, search
 from .problem import ALIGNED, Problem, across_reversals, problem_of
+from .selection import Selection
+from .stepwise import select
 from .timing import late, overlooked, with_late_force
 
 
@@ -23,7 +24,7 @@ def searched(motion: Motion, problem: Problem, seed: int) -> Findings:
     lateness = None
     if any(traits(term).late for term in found.selection.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
-        in_slip = found.problem.in_slip or found.problem, found.selection.start or found.selection
+        in_slip = found.problem.in_slip or found.problem, found.selection.in_slip or found.selection
         lateness = late(motion, *in_slip)
     sure = lateness is not None
     lateness = lateness or overlooked(motion, *found, seed)
@@ -44,7 +45,7 @@ def nothing(problem: Problem) -> Findings:
     for candidates in problem.candidate_sets:
         candidates.close()
     remaining = Contest([], [], float(len(problem.base.residual)))
-    return alone(Solution(problem, Named(problem.base, problem.base, [], remaining)))
+    return alone(Solution(problem, Selection(problem.base, problem.base, [], remaining)))
 
 
 def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
@@ -55,7 +56,7 @@ def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
 def aligned(motion: Motion, problem: Problem, seed: int) -> Solution:
     """The terms selected; once more if they change how force and motion are aligned."""
     found = _selected(motion, problem, seed)
-    if found.selection.taken:
+    if found.selection.selected:
         again = problem_of(motion, problem.structure, found.selection.last, found.problem)
         interval = found.problem.evidence.limits.interval
         if abs(again.delay - found.problem.delay) > ALIGNED * interval:
@@ -69,16 +70,11 @@ def _selected(motion: Motion, problem: Problem, seed: int) -> Solution:
     What acts at reversals is ten times as large in those, and no term has quite its shape: the
     remainder would hide all else.
     """
-    in_slip = _select(problem, seed)
+    in_slip = select(problem, seed)
     across = across_reversals(motion, problem)
     if across is None:
         return Solution(problem, in_slip)
-    return Solution(across, _select(across, seed, in_slip))
-
-
-def _select(problem: Problem, seed: int, in_slip: Named | None = None) -> Named:
-    evidence, candidates, wide = problem.evidence, problem.candidate_set, problem.wide_kernels
-    return search(evidence, problem.base, candidates, wide, seed, in_slip)
+    return Solution(across, select(across, seed, in_slip))
 
 
 def at_given(model: Model, findings: Findings, free: tuple[int, ...]) -> Findings:

@@ -147,7 +147,7 @@ def shared(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
     return power
 
 
-def fast_tone(evidence: Evidence, now: Fit) -> np.ndarray:
+def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     """Frequencies about the strongest tone above those scanned for, Hz; none if none stands out.
 
     By the residual's spectrum, up to where it has a period in the kernel's half: beyond, rows
@@ -161,7 +161,7 @@ def fast_tone(evidence: Evidence, now: Fit) -> np.ndarray:
     if place[-1] > SPARSE * len(place):
         return _NONE
     series = np.zeros(OVERSAMPLING * (int(place[-1]) + 1))
-    series[place] = now.residual
+    series[place] = current.residual
     tones = np.fft.rfftfreq(len(series), 0.5 / top)
     above = tones > scanned
     power, tones = np.abs(np.fft.rfft(series)[above]) ** 2, tones[above]

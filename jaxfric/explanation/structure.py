@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from ..terms.effects import EFFECTS
+from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY
 from .baseline import Mismatch
 from .bins import unit
 from .evidence import Evidence
 from .explained import Finding
 from .improvement import Improved
 from .locate import NOISY, Structure, locate, repeated
-from .naming import LATER_SHARE, LEAST_SHARE, LINEARITY
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit
@@ -25,7 +25,7 @@ def before_and_after(
     """Where the baseline's residual has structure, and where that of the findings has."""
     problem = better.findings.problem
     before = _shown(better.first, problem, problem, LEAST_SHARE, seed)
-    if not better.findings.selection.taken and wrong is None:
+    if not better.findings.selection.selected and wrong is None:
         return before, []
     undelayed, selection = better.findings.undelayed
     return before, _shown(selection.last, undelayed, problem, LATER_SHARE, seed)

@@ -17,9 +17,9 @@ from .errors import document, filtered_errors
 from .explained import ELSEWHERE, Explanation, Finding
 from .figures import Figures
 from .improvement import Improved, holdout_model
-from .naming import Named
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
+from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, rough, stand_ins, verdict_of
 
@@ -51,7 +51,9 @@ def summarise(
         pictures = [moved_curve(better, wrong), *pictures]
     pairs = sorted(zip(findings, pictures, strict=True), key=lambda pair: -pair[0].share)
     findings = [finding for finding, _ in pairs]
-    models = tuple(spelled.model(now, recording.units) for now in (better.first, selection.last))
+    models = tuple(
+        spelled.model(current, recording.units) for current in (better.first, selection.last)
+    )
     filtered = filtered_errors(better.findings, better.first)
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(better)]
@@ -79,7 +81,7 @@ def summarise(
     )
 
 
-def _selection(better: Improved) -> Named:
+def _selection(better: Improved) -> Selection:
     return better.findings.selection
 
 
@@ -134,9 +136,9 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
     return [Remark("holdout_differs", text, False)]
 
 
-def _not_visible(selection: Named, units, absent: Sequence[str]) -> list[dict[str, Any]]:
+def _not_visible(selection: Selection, units, absent: Sequence[str]) -> list[dict[str, Any]]:
     """The smallest visible size of each effect that was neither found nor dropped."""
-    sizes = verification.smallest_visible(selection.left, selection.last)
+    sizes = verification.smallest_visible(selection.remaining, selection.last)
     return [
         {"effect": effect, "smallest_detectable": float(size), "unit": units["force"]}
         for effect, size in sorted(sizes.items(), key=lambda item: item[1])

@@ -15,15 +15,16 @@ import numpy as np
 from ..data.recording import Recording
 from ..terms.effect import Effect
 from ..terms.effects import EFFECTS, traits
+from .acceptance import least_gain
 from .candidates import Candidate
 from .contest import RIVAL, Trial
 from .evidence import gather
 from .findings import Findings, Solution
 from .motion import Motion, motion_of
-from .naming import Named, Taken, least_gain
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit, without
+from .selection import SelectedTerm, Selection
 from .significance import BLOCKS, LEVEL, agreement
 
 Undo = Callable[[Recording, float], Recording]
@@ -37,21 +38,21 @@ PARABOLAS, CLOSE = 4, 3e-3
 class LateForce(NamedTuple):
     """A force that acts late: its time, s, and how to undo it.
 
-    `selected`: the term, under its right name; `smoothed`: the error of the time by smoothing and
+    `selected`: the term, under its right name; `time_error`: the error of the time by smoothing and
     sampling, s.
     """
 
     time: float
     undo: Undo
-    selected: Taken
-    smoothed: float
+    selected: SelectedTerm
+    time_error: float
 
     def undone(self, recording: Recording | Motion) -> Motion:
         """The motion of a recording with its force where it belongs."""
         return _undone(motion_of(recording), self.undo, self.time)
 
 
-def late(recording: Motion, problem: Problem, found: Named) -> LateForce | None:
+def late(recording: Motion, problem: Problem, found: Selection) -> LateForce | None:
     """The delay or lag among the findings under its right name, where there is one."""
     index = [i for i, term in enumerate(found.last.terms) if traits(term).late]
     if len(index) != 1 or index[0] < found.term_index(0):
@@ -60,7 +61,9 @@ def late(recording: Motion, problem: Problem, found: Named) -> LateForce | None:
     if guess <= 0:
         return None
     undoing = _Undoing(recording, problem, found.last)
-    return _told_apart(undoing, guess, found.taken[index[0] - found.term_index(0)], found.left.size)
+    return _told_apart(
+        undoing, guess, found.selected[index[0] - found.term_index(0)], found.remaining.size
+    )
 
 
 # Undoing a delay or lag that is there takes most of what is left; what merely resembles one, as the
@@ -69,7 +72,7 @@ MOST_LATE = 0.5
 
 
 def overlooked(
-    recording: Motion, problem: Problem, found: Named, seed: int = 0
+    recording: Motion, problem: Problem, found: Selection, seed: int = 0
 ) -> LateForce | None:
     """A delay or lag beside the findings that is too long for its first order to show.
 
@@ -102,7 +105,7 @@ def overlooked(
         return None
     candidate = _candidate(effect)
     trial = Trial(candidate, np.zeros(0), gain, 0.0, 1, p_value, np.inf, 1.0)
-    return _told_apart(undoing, time, Taken(trial, (), p_value), found.left.size)
+    return _told_apart(undoing, time, SelectedTerm(trial, (), p_value), found.remaining.size)
 
 
 class _Undoing:
@@ -133,11 +136,11 @@ class _Undoing:
         """
         problem, width = self.problem, width or self.problem.evidence.width
         view = gather(_undone(self.motion, undo, time), width, problem.delay, problem.reversals)
-        now = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
+        current = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
         before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
-        left = float(np.mean(now.residual**2))
+        left = float(np.mean(current.residual**2))
         noisy = min(self.power * after / left, 1.0) if left > 0 else 1.0
-        return now.residual * float(np.sqrt(1 + noisy * (before / after - 1)))
+        return current.residual * float(np.sqrt(1 + noisy * (before / after - 1)))
 
     def gain(self, undo: Undo, time: float, width: int) -> float:
         """The part of the energy that undoing a time takes away."""
@@ -180,7 +183,7 @@ def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
     return float(middle - 0.5 * spread * slope / square) if square > 0 else float("nan")
 
 
-def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> LateForce:
+def _told_apart(undoing: _Undoing, guess: float, selected: SelectedTerm, size: float) -> LateForce:
     """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
     problem = undoing.problem
     least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
@@ -188,15 +191,15 @@ def _told_apart(undoing: _Undoing, guess: float, taken: Taken, size: float) -> L
     energy, time = least.pop(best.name)
     others = {name: 0.5 * size * np.log(left / energy) for name, (left, _) in least.items()}
     near = (name for name, gap in others.items() if gap < RIVAL)
-    rivals = (*near, *(r for r in taken.rivals if r != best.name and r not in others))
+    rivals = (*near, *(r for r in selected.rivals if r != best.name and r not in others))
     wide = time
     if problem.wide is not None:
         wide = undoing.least(best.undone, time, 2 * problem.evidence.width)[1]
     # Smoothing errs with the square of the width, so a third of what doubling it changes is left
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
-    smoothed = float(np.hypot((wide - time) / 3, problem.evidence.limits.interval / np.sqrt(12)))
-    trial = taken.trial._replace(candidate=_candidate(best))
-    return LateForce(time, best.undone, taken._replace(trial=trial, rivals=rivals), smoothed)
+    time_error = float(np.hypot((wide - time) / 3, problem.evidence.limits.interval / np.sqrt(12)))
+    trial = selected.trial._replace(candidate=_candidate(best))
+    return LateForce(time, best.undone, selected._replace(trial=trial, rivals=rivals), time_error)
 
 
 def ways() -> list[Effect]:
@@ -225,9 +228,9 @@ def with_late_force(found: Solution, undelayed: Solution, late: LateForce) -> Fi
     )
     selection = found.selection._replace(
         last=current,
-        taken=[*others.taken, late.selected],
-        left=others.left,
-        smoothed=late.smoothed,
+        selected=[*others.selected, late.selected],
+        remaining=others.remaining,
+        time_error=late.time_error,
         undone=late.undone,
     )
     return Findings(Solution(found.problem, selection), undelayed)
@@ -239,18 +242,18 @@ def _worth_it(undelayed: Solution, late: LateForce, base: Fit) -> Solution:
     As for any later term, but that an undone delay leaves nothing of its own.
     """
     problem, selection = undelayed
-    others = [t for t in selection.taken if not t.trial.candidate.effect.late]
+    others = [t for t in selection.selected if not t.effect.late]
     index = [i for i, term in enumerate(selection.last.terms) if not traits(term).late]
     seen = with_predictions(problem.evidence, selection.last)
     terms, betas = ([values[i] for i in index] for values in selection.last[:2])
     current = fit(terms, seen, betas, 6)
     for number in reversed(range(len(others))):
         less = without(current, seen, len(current.terms) - len(others) + number)
-        effects = [t.trial.candidate.effect for t in (late.selected, *others[: number + 1])]
+        effects = [t.effect for t in (late.selected, *others[: number + 1])]
         least = least_gain(effects[-1], effects[:-1], base.energy, less.energy, 0.0)
         if less.energy - current.energy < least:
             current, others = less, [t for i, t in enumerate(others) if i != number]
-    return Solution(problem, selection._replace(last=current, taken=others))
+    return Solution(problem, selection._replace(last=current, selected=others))
 
 
 def _undone(motion: Motion, undo: Undo, time: float) -> Motion:

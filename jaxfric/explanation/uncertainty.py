@@ -22,7 +22,7 @@ def estimated(findings: Findings) -> list[dict[str, Estimate]]:
     problem, others = findings.undelayed if delayed else findings.recorded
     late = [
         {
-            name: own._replace(standard_error=np.hypot(own.standard_error, selection.smoothed))
+            name: own._replace(standard_error=np.hypot(own.standard_error, selection.time_error))
             for name, own in term.items()
         }
         for term in ours[len(others.last.terms) :]

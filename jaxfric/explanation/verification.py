@@ -4,16 +4,17 @@ import numpy as np
 
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
+from .acceptance import LEAST_SHARE
 from .baseline import as_given
 from .contest import Contest
 from .evidence import Evidence
-from .naming import LEAST_SHARE, Named
 from .predictions import with_predictions
 from .regression import Fit, fast, without
+from .selection import Selection
 
 
 def residual(
-    now: Fit,
+    current: Fit,
     evidence: Evidence,
     rephased: frozenset[int] = frozenset(),
     skipped: frozenset[int] = frozenset(),
@@ -24,17 +25,17 @@ def residual(
     their amplitude but find their phase anew: the zero of an incremental encoder is another after
     each homing, and that of the clock in each recording.
     """
-    return _there(now, evidence, rephased, skipped)[0]
+    return _there(current, evidence, rephased, skipped)[0]
 
 
 def _there(
-    now: Fit, evidence: Evidence, rephased: frozenset[int], skipped: frozenset[int]
+    current: Fit, evidence: Evidence, rephased: frozenset[int], skipped: frozenset[int]
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """The [`residual`][] on a recording, and the affine parameters of each term there."""
-    seen = with_predictions(evidence, now)
-    left, waves, alphas = evidence.target.copy(), [], list(now.alphas)
+    seen = with_predictions(evidence, current)
+    left, waves, alphas = evidence.target.copy(), [], list(current.alphas)
     for number, (term, beta, alpha) in enumerate(
-        zip(now.terms, now.betas, now.alphas, strict=True)
+        zip(current.terms, current.betas, current.alphas, strict=True)
     ):
         if number in skipped:
             continue
@@ -54,59 +55,61 @@ def _there(
     return left, alphas
 
 
-def at_phase(now: Fit, evidence: Evidence, rephased: frozenset[int]) -> Fit:
+def at_phase(current: Fit, evidence: Evidence, rephased: frozenset[int]) -> Fit:
     """A fit with the waves of those numbers at their phase on another recording."""
-    return now._replace(alphas=tuple(_there(now, evidence, rephased, frozenset())[1]))
+    return current._replace(alphas=tuple(_there(current, evidence, rephased, frozenset())[1]))
 
 
-def wavelike(now: Fit, number: int) -> bool:
+def wavelike(current: Fit, number: int) -> bool:
     """Whether a term is a wave over position, whose phase belongs to the encoder's zero."""
-    term = now.terms[number]
+    term = current.terms[number]
     paired = bool(term.affine) and all(p.name.endswith(("_sin", "_cos")) for p in term.affine)
     return paired and "position" in term.coordinates
 
 
-def lasting(now: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
+def lasting(current: Fit, rephased: frozenset[int] = frozenset()) -> Fit:
     """A fit without the terms that say nothing of another recording; only its terms and β count."""
-    return now.only(
-        [i for i, t in enumerate(now.terms) if i not in rephased and not traits(t).momentary]
+    return current.only(
+        [i for i, t in enumerate(current.terms) if i not in rephased and not traits(t).momentary]
     )
 
 
-def error(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
+def error(current: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> float:
     """norm(force − predicted)/norm(force) over the rows, nothing refitted.
 
     Found terms that time alone drives count where they return, and not where they do not; tones may
     return at another phase.
     """
-    power = min(float(left @ left) for left, _, _ in _ways(now, evidence, rephased))
+    power = min(float(left @ left) for left, _, _ in _ways(current, evidence, rephased))
     return float(np.sqrt(power / max(evidence.force @ evidence.force, 1e-300)))
 
 
-def carried(now: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> Fit:
+def carried(current: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()) -> Fit:
     """A fit as it stands on another recording, by the way in which [`error`][] is taken there.
 
     Without what belongs to a moment that does not return, waves at their phase there; what else
     it holds is still of the recording that it was fitted to.
     """
-    ways = _ways(now, evidence, rephased)
+    ways = _ways(current, evidence, rephased)
     _, alphas, skipped = min(ways, key=lambda way: float(way[0] @ way[0]))
-    other = now._replace(alphas=tuple(alphas))
-    return other.only([i for i in range(len(now.terms)) if i not in skipped]) if skipped else other
+    other = current._replace(alphas=tuple(alphas))
+    return (
+        other.only([i for i in range(len(current.terms)) if i not in skipped]) if skipped else other
+    )
 
 
-def _ways(now: Fit, evidence: Evidence, rephased: frozenset[int]):
+def _ways(current: Fit, evidence: Evidence, rephased: frozenset[int]):
     """Residual, affine parameters and terms left out, for each way in which moments may return."""
-    moments = frozenset(i for i, t in enumerate(now.terms) if i and traits(t).momentary)
+    moments = frozenset(i for i, t in enumerate(current.terms) if i and traits(t).momentary)
     ways = [(rephased, frozenset[int]())]
     if moments:
         ways.append((rephased, moments))
-    if tones := _tones(now):
+    if tones := _tones(current):
         ways.append((rephased | tones, moments - tones))
-    return [(*_there(now, evidence, anew, skipped), skipped) for anew, skipped in ways]
+    return [(*_there(current, evidence, anew, skipped), skipped) for anew, skipped in ways]
 
 
-def lacking(named: Named, evidence: Evidence, number: int) -> Fit:
+def lacking(named: Selection, evidence: Evidence, number: int) -> Fit:
     """The model refitted without the found term of that number; the base where it is not kept."""
     less = without(named.last, evidence, named.term_index(number))
     return less if named.given is None else as_given(named.given, less, evidence, named.free)
@@ -147,8 +150,8 @@ def residuals(
     )
     shared = {id(t) for t in less.terms[1:] if any(t is m for m in more.terms)}
     idle = [
-        frozenset(i for i, t in enumerate(now.terms) if id(t) in shared and traits(t).momentary)
-        for now in (less, more)
+        frozenset(i for i, t in enumerate(current.terms) if id(t) in shared and traits(t).momentary)
+        for current in (less, more)
     ]
 
     def pair(skipped, anew) -> tuple[np.ndarray, np.ndarray]:
@@ -158,7 +161,7 @@ def residuals(
         )
 
     none = [frozenset[int]()] * 2
-    tones = [_tones(now) & same for now, same in zip((less, more), idle, strict=True)]
+    tones = [_tones(current) & same for current, same in zip((less, more), idle, strict=True)]
     ways = [(idle, none)]
     if idle[1]:
         ways.append((none, none))
@@ -168,9 +171,9 @@ def residuals(
     return min((pair(*way) for way in ways), key=lambda both: both[1] @ both[1])
 
 
-def _tones(now: Fit) -> frozenset[int]:
+def _tones(current: Fit) -> frozenset[int]:
     """Numbers of the found terms that are tones in time."""
-    known = enumerate(now.terms)
+    known = enumerate(current.terms)
     return frozenset(i for i, t in known if i and _is_tone(t))
 
 
@@ -179,24 +182,24 @@ def _is_tone(term: AbstractTerm) -> bool:
     return waves is not None and waves.coordinate == "time"
 
 
-def noise(now: Fit, reference: np.ndarray) -> float:
+def noise(current: Fit, reference: np.ndarray) -> float:
     """The part of the force error that no model could remove, by [`fast`][]."""
-    return fast(now) / float(np.sqrt(np.mean(reference**2)))
+    return fast(current) / float(np.sqrt(np.mean(reference**2)))
 
 
-def smallest_visible(contest: Contest, now: Fit) -> dict[str, float]:
+def smallest_visible(contest: Contest, current: Fit) -> dict[str, float]:
     """The smallest force, N rms in slip, of each effect that would have been named, by effect.
 
     A term is named if its R² is over what chance gives at the highest of all draws and over
     `LEAST_SHARE`; the least of an effect's shapes counts.
     """
-    level = float(np.sqrt(now.energy / len(now.residual)))
+    level = float(np.sqrt(current.energy / len(current.residual)))
     found: dict[str, float] = {}
     for trial in contest.trials:
         least = max(LEAST_SHARE, trial.threshold)
         if not np.isfinite(least):
             continue
         size = level * np.sqrt(least) / max(trial.new_part, 1e-3)
-        name = trial.candidate.effect.name
+        name = trial.effect.name
         found[name] = min(size, found.get(name, np.inf))
     return found

@@ -14,8 +14,8 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...simulators import Mujoco
+from ..acceptance import LINEARITY
 from ..baseline import _fewest as fewest
-from ..naming import LINEARITY
 from ..predictions import rate
 from ..regression import orthonormal
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked

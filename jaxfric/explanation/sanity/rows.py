@@ -9,9 +9,9 @@ from ...data.recording import Recording
 from ...models import Model
 from ...simulators import AbstractSimulator
 from ...terms import KNOWN_FORCE
+from ..acceptance import LINEARITY
 from ..evidence import Evidence, gather
 from ..motion import motion_of
-from ..naming import LINEARITY
 from ..regression import RANK, orthonormal
 from ..significance import blocks
 

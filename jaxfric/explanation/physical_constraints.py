@@ -1,4 +1,4 @@
-"""What a machine can have: a load within its inertia and friction, a memory of a curve it shows."""
+"""Physical constraints: a load within the machine's inertia and friction, forces beyond zero."""
 
 from collections.abc import Iterator
 
@@ -13,42 +13,42 @@ from .evidence import Evidence
 from .regression import Fit, fit
 from .significance import blocks
 
-# Where the rows tell an inertia badly and ask for somewhat more than there is, they are asked about
-# all there is; a hundredth less, not to be refused by rounding.
+# Where the rows determine an inertia badly and prefer somewhat more than the machine has, a load
+# with all of it is tried; a hundredth less, not to be refused by rounding.
 TRIES, LIGHTER = 3, 1.01
 
 
-def machines(round_: Contest, now: Fit, evidence: Evidence) -> Contest:
-    """The finalists that are parts of a machine, the best first: as they are, or the nearest."""
+def constrained(round_: Contest, current: Fit, evidence: Evidence) -> Contest:
+    """The finalists within the constraints, the best first: as they are, or the nearest."""
     found = []
     for finalist in round_.finalists:
         for _ in range(TRIES):
-            if plausible(finalist, now, evidence):
+            if physical(finalist, current, evidence):
                 found.append(finalist)
                 break
-            lighter = _lighter(finalist, now, evidence, round_.size)
+            lighter = _lighter(finalist, current, evidence, round_.size)
             if lighter is None:
                 break
             finalist = lighter
     return round_._replace(finalists=sorted(found, key=lambda each: -each.score))
 
 
-def _lighter(finalist: Finalist, now: Fit, evidence: Evidence, size: float) -> Finalist | None:
+def _lighter(finalist: Finalist, current: Fit, evidence: Evidence, size: float) -> Finalist | None:
     """A load with no more inertia than the machine has, its friction fitted again.
 
-    `None` where the rows tell the inertia, and where it is the friction that is too much.
+    `None` where the rows determine the inertia, and where the friction is too much.
     """
     trial = finalist.trial
     burden = trial.candidate.term.burden(finalist.betas[-1], finalist.alpha)
     if burden is None or burden.lighter is None:
         return None
-    own, most = _beside(finalist, now, evidence)
+    own, most = _beside(finalist, current, evidence)
     too_much = own.friction > most["coulomb"] + most["stribeck_force"]
     if too_much or not 0 < most["inertia"] < own.inertia:
         return None
     beta = burden.lighter(LIGHTER * own.inertia / most["inertia"])
-    there = fit([trial.candidate.term], evidence, [beta], 0, now.basis())
-    gain = 1 - there.energy / now.energy
+    there = fit([trial.candidate.term], evidence, [beta], 0, current.basis())
+    gain = 1 - there.energy / current.energy
     return finalist._replace(
         score=trial.score(gain, size),
         p_value=finalist.p_value if gain > trial.threshold else 1.0,
@@ -58,48 +58,49 @@ def _lighter(finalist: Finalist, now: Fit, evidence: Evidence, size: float) -> F
     )
 
 
-def plausible(finalist: Finalist, now: Fit, evidence: Evidence) -> bool:
-    """Whether a candidate beside the rest of the model is a machine.
+def physical(finalist: Finalist, current: Fit, evidence: Evidence) -> bool:
+    """Whether a candidate beside the rest of the model keeps the constraints.
 
-    A part of the inertia and of the friction hangs on a spring or behind a gap, not more than there
-    is, nor does it rest while the motor moves by a tenth of the stroke: that were a spring to the
-    ground. What follows speed late is a part of the friction, by a Stribeck curve that is there in
-    steady slip too.
+    A load on a spring or behind a gap has a part of the inertia and of the friction, and does not
+    rest while the motor moves by a tenth of the stroke: that would be a spring to the ground.
+    Friction that follows speed late follows a Stribeck curve that shows in steady slip too.
     """
     burden = finalist.trial.candidate.term.burden(finalist.betas[-1], finalist.alpha)
     if burden is None:
         return True
-    bumps = any(isinstance(leaf, AbstractBump) for t in now.terms for leaf in leaves(t))
+    bumps = any(isinstance(leaf, AbstractBump) for t in current.terms for leaf in leaves(t))
     if burden.curved and not bumps:
         return False
     if burden.give and burden.give > 0.1 * (evidence.limits.high - evidence.limits.low):
         return False
-    own, most = _beside(finalist, now, evidence)
+    own, most = _beside(finalist, current, evidence)
     enough = own.friction <= most["coulomb"] + most["stribeck_force"]
     return own.inertia <= most["inertia"] and enough
 
 
-def nil(now: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
+def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
     """Numbers of the last `count` terms all of whose forces may as well be none, the last first.
 
     The errors contain what a kernel of twice the width changes, `wide`.
     """
-    start = len(now.terms) - count
+    start = len(current.terms) - count
     units = evidence.motion.unit_names
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    values = spelled.estimates(now, block, units)
+    values = spelled.estimates(current, block, units)
     if wide is not None:
-        there = spelled.refitted_to(wide, now, int(block[-1]) + 1, units)
+        there = spelled.refitted_to(wide, current, int(block[-1]) + 1, units)
         values = [spelled.with_smoothing(*pair) for pair in zip(values, there, strict=True)]
     for number in reversed(range(count)):
-        if spelled.may_be_none(now.terms[start + number], values[start + number]):
+        if spelled.may_be_none(current.terms[start + number], values[start + number]):
             yield number
 
 
-def _beside(finalist: Finalist, now: Fit, evidence: Evidence) -> tuple[Burden, dict[str, float]]:
-    """What a term takes of the machine, beside all the others, and what the machine has of it."""
+def _beside(
+    finalist: Finalist, current: Fit, evidence: Evidence
+) -> tuple[Burden, dict[str, float]]:
+    """What a term has of inertia and friction, beside all the others, and what the machine has."""
     term = finalist.trial.candidate.term
-    both = fit((*now.terms, term), evidence, finalist.betas, 0)
+    both = fit((*current.terms, term), evidence, finalist.betas, 0)
     own = term.burden(both.betas[-1], both.alphas[-1])
     values = [
         (p.name.rstrip("+-"), float(a))

@@ -1,0 +1,141 @@
+"""What a winner must pass to be selected: significance, share, size, and wider kernels."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..terms.effect import Effect
+from .contest import Contest, Finalist
+from .evidence import Evidence
+from .predictions import with_predictions
+from .problem import BETWEEN, WideKernels
+from .regression import Fit, fast, fit
+from .selection import SelectedTerm
+from .significance import DRAWS, LEVEL
+
+# Least part of the mean-square residual that a first and a later term must remove. Below it the
+# amplitude is under a sixth of the residual's, where held forces, encoder counts and smoothed
+# velocities leave traces of their own.
+LEAST_SHARE = 0.03
+LATER_SHARE = 0.05
+# A later term must also remove this part of the base's residual, or a third of what the earlier
+# terms leave: no term has quite the shape of its effect, and a tenth of its amplitude may remain.
+# No other law has the shape of that remainder, so that it removes less than a third of it. Below a
+# hundredth of the amplitude no force is known to follow its law.
+OF_BASE, LEAST_OF_BASE = 0.01, 1e-4
+MOST = 1 / 3
+# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
+# force's root mean square, cannot be told from the sensor whatever its p-value.
+LINEARITY = 2e-3
+
+
+# Sharp terms hold the very noise that they are tested against: none of the draws may be as good.
+RAREST = 1.5 / (1 + DRAWS)
+
+
+# Isolated pushes besides another effect are mostly where that effect switches, and terms on the
+# force's own derivatives take what a strong effect leaves through the kernel; a load behind a gap
+# is one of them, with three numbers of its own: effects with the trait `leftover`.
+EASY_OF_BASE = 0.05
+# Idealisations of what happens about a reversal (one spring, friction without a dip on the load):
+# half of the amplitude of one is no evidence for another of them, or for pushes there.
+REVERSAL_OF_BASE = 0.25
+# A term that removes three quarters of the residual needs none of these: the remainder of an
+# idealisation is not of one law's shape. On machines with one effect a second name took two thirds
+# at most.
+NEARLY_ALL = 0.75
+
+
+def accepted(
+    round_: Contest, current: Fit, evidence, wider, base: Fit, selected: list[SelectedTerm]
+) -> Finalist | None:
+    """The best finalist that passes, beside the terms selected before; `None` if none does."""
+    least = LATER_SHARE if selected else LEAST_SHARE
+    force = float(evidence.force @ evidence.force)
+    before = [t.effect for t in selected]
+    for finalist in round_.finalists:
+        gained = current.energy - finalist.energy
+        candidate = finalist.trial.candidate
+        effect = candidate.effect
+        floor = LINEARITY**2 * force
+        enough = gained >= max(max(least, candidate.least) * current.energy, floor)
+        if effect.ubiquitous:
+            enough &= gained >= fast(current) ** 2 * len(current.residual)
+        if selected:
+            enough &= gained >= least_gain(effect, before, base.energy, current.energy)
+            enough &= not _again(finalist, selected)
+        level = RAREST if effect.sharp else LEVEL
+        if not (finalist.score > 0 and finalist.p_value <= level and enough):
+            continue
+        if (effect.sharp or candidate.term.swings) and not _confirmed(
+            finalist, current, wider, least
+        ):
+            continue
+        return finalist
+    return None
+
+
+def least_gain(
+    effect: Effect,
+    before: Sequence[Effect],
+    base: float,
+    left: float,
+    floor: float = LEAST_OF_BASE,
+) -> float:
+    """The energy that a term after others must remove, N².
+
+    **Arguments:** `before`: the effects selected already; `base` and `left`: the energy that the
+    base left, and that they leave; `floor`: the least part of the base's.
+    """
+    again = any(earlier.at_reversals for earlier in before)
+    if again and (effect.at_reversals or effect.isolated):
+        return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
+    if effect.leftover:
+        return min(EASY_OF_BASE * base, NEARLY_ALL * left)
+    return max(floor * base, min(OF_BASE * base, MOST * left))
+
+
+def _again(finalist: Finalist, selected: list[SelectedTerm]) -> bool:
+    """Whether the effect has been selected already; of waves there may be several."""
+    own = finalist.trial.candidate
+    several = own.lines is not None or own.effect.several
+    return not several and any(t.effect.name == own.effect.name for t in selected)
+
+
+# Noise of the encoder makes, by the controller's answer, a quarter of the residual at most.
+HALF = 0.5
+
+
+def _confirmed(finalist: Finalist, current: Fit, wider: WideKernels, least: float) -> bool:
+    """Whether a term is the same through a kernel of twice the width.
+
+    There the noise of the derivatives is 2⁵ to 2⁷ times weaker in power, the physics hardly. But a
+    load may swing above that kernel's band. If it removes half of the residual, which noise of the
+    encoder through the controller never did on machines without effects (a quarter at most), a
+    kernel of 4/3 of the width will do.
+    """
+    between, wide = wider
+    if wide is None or _alike(finalist, current, wide, 2.0, least):
+        return True
+    term = finalist.trial.candidate.term
+    most = current.energy - finalist.energy >= HALF * current.energy
+    loud = term.swings and most and between is not None
+    return loud and _alike(finalist, current, between, BETWEEN, least)
+
+
+def _alike(finalist: Finalist, current: Fit, wide: Evidence, factor: float, least: float) -> bool:
+    """Whether a term has the same size, within a factor, through a kernel as much wider.
+
+    A column of noise changes by more.
+    """
+    less = fit(current.terms, with_predictions(wide, current), current.betas, 4)
+    seen = with_predictions(wide, less)
+    # At the β of the narrow kernel: where the wide one leaves little, it would find another.
+    term, beta, basis = finalist.trial.candidate.term, finalist.betas[-1], less.basis()
+    there = fit([term], seen, [beta], 0, basis)
+    ratio = np.linalg.norm(there.part(0)) / max(
+        float(np.linalg.norm(there.columns @ finalist.alpha)), 1e-300
+    )
+    positive = bool(np.all(there.alphas[0] > 0))
+    enough = less.energy - there.energy >= least * less.energy
+    return positive and 1 / factor < ratio < factor and enough

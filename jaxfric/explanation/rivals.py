@@ -1,0 +1,78 @@
+"""Which of several candidates that fit alike is selected, and which cannot be told from it."""
+
+import numpy as np
+
+from .contest import RIVAL, Contest, Finalist
+from .regression import Fit
+from .significance import LEVEL
+
+# No idealisation of a reversal is right to the last tenth of its score, and a law of three
+# nonlinear parameters finds that tenth in any of them: then the law with fewer is selected.
+NO_EVIDENCE = 0.9
+
+
+def simplest(best: Finalist, round_: Contest) -> Finalist:
+    """The best, or an idealisation of the same with fewer parameters that does nearly as well."""
+
+    def enough(other: Finalist) -> bool:
+        effect = other.effect
+        known = effect.at_reversals and not effect.sharp and other.p_value <= LEVEL
+        fewer = len(other.betas[-1]) < len(best.betas[-1])
+        return known and fewer and other.score >= NO_EVIDENCE * best.score
+
+    if not best.effect.at_reversals:
+        return best
+    return next((other for other in round_.finalists if enough(other)), best)
+
+
+# Effects whose force is the same but for 5 % cannot be told apart: between them only noise decides,
+# which is never quite as assumed.
+ALIKE = 0.95
+
+
+def with_rivals(
+    best: Finalist, round_: Contest, current: Fit, evidence
+) -> tuple[Finalist, tuple[str, ...]]:
+    """The best, and the effects that cannot be told from it.
+
+    Of a line in position and one in time, which are the same at constant speed, the one in position
+    is selected: a machine has more pitches than clocks.
+    """
+    basis, force = current.basis(), _force(best, evidence)
+    force = force - basis @ (basis.T @ force)
+    alike = []
+    for other in round_.finalists:
+        if other.effect.name == best.effect.name:
+            continue
+        theirs = _force(other, evidence)
+        theirs = theirs - basis @ (basis.T @ theirs)
+        size = np.linalg.norm(force) * np.linalg.norm(theirs)
+        same = size > 0 and abs(force @ theirs) > ALIKE * size
+        # The remainder of a term that is but the first order of its effect is no evidence, neither
+        # against significant effects that it is known to be confused with nor against itself.
+        effect, rival = best.effect, other.effect
+        rough = effect.first_order or rival.first_order
+        excused = rough and rival.name in effect.confusable_with
+        half = current.energy - other.energy >= 0.5 * (current.energy - best.energy)
+        significant = other.p_value <= LEVEL and half
+        if same or other.score > best.score - RIVAL or (excused and significant):
+            alike.append((other, same))
+    names = [f.effect.name for f, _ in alike]
+    own = best.effect.name
+    twin = [f for f, same in alike if same and _line(f, "position")]
+    if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
+        best = twin[0]
+        instead = best.effect.name
+        names = [own, *(name for name in names if name != instead)]
+    return best, tuple(dict.fromkeys(names))
+
+
+def _line(finalist: Finalist, coordinate: str) -> bool:
+    """Whether it is a wave over a coordinate alone."""
+    lines = finalist.trial.candidate.lines
+    return lines is not None and lines.coordinate == coordinate and not lines.sided
+
+
+def _force(finalist: Finalist, evidence) -> np.ndarray:
+    columns = evidence.columns(finalist.trial.candidate.term, finalist.betas[-1][None])[0]
+    return columns @ finalist.alpha

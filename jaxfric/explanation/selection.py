@@ -1,0 +1,68 @@
+"""What a search selects: terms on top of the base, with what each could be instead."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from ..data.recording import Recording
+from ..models import Model
+from ..terms.effect import Effect
+from .contest import Contest, Trial
+from .motion import Motion
+from .regression import Fit
+
+
+class SelectedTerm(NamedTuple):
+    """A term that was selected, the effects that it may be as well, and its p-value.
+
+    `rephased`: whether on the held-out recording its waves only fit with another phase;
+    `confirmed`: whether that recording confirms it, `None` where it cannot say.
+    """
+
+    trial: Trial
+    rivals: tuple[str, ...]
+    p_value: float
+    rephased: bool = False
+    confirmed: bool | None = None
+
+    @property
+    def effect(self) -> Effect:
+        """The effect of the term."""
+        return self.trial.effect
+
+
+class Selection(NamedTuple):
+    """The terms that the residual calls for, on top of the base.
+
+    - `base` and `last`: the fits before and after.
+    - `selected`: in the order of discovery; `remaining`: the contest for what remains.
+    - `in_slip`: what rows in slip had shown, where rows reach across reversals.
+    - `given`: the base with its own values, where these stay but for `free`, numbers of its
+      parameters.
+    - `undone`: puts back the force of a recording, where it acts late; `time_error`: of that time,
+      by smoothing and sampling, s.
+    """
+
+    base: Fit
+    last: Fit
+    selected: list[SelectedTerm]
+    remaining: Contest
+    time_error: float = 0.0
+    in_slip: "Selection | None" = None
+    given: Model | None = None
+    free: tuple[int, ...] = ()
+    undone: Callable[[Recording], Motion] | None = None
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The effects that were found."""
+        return frozenset(each.effect.name for each in self.selected)
+
+    def term_index(self, number: int) -> int:
+        """The index, among all terms of the fit, of the selected term of that number."""
+        return len(self.last.terms) - len(self.selected) + number
+
+    @property
+    def rephased(self) -> frozenset[int]:
+        """Indices of the terms that need another phase on the held-out recording."""
+        numbers = enumerate(self.selected)
+        return frozenset(self.term_index(number) for number, each in numbers if each.rephased)
