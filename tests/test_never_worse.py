@@ -11,7 +11,7 @@ import pytest
 from jaxfric import models, predict, read, terms
 from jaxfric.cli import main
 from jaxfric.data import io
-from jaxfric.explanation import doubts, explain, improvement, regression
+from jaxfric.explanation import doubts, explain, improvement, least_squares, regression
 from jaxfric.explanation.explained import DOUBTED
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
@@ -237,12 +237,12 @@ def test_a_narrow_bump_is_no_higher_than_the_largest_force():
     columns = np.stack([np.ones(200), np.where(np.arange(200) == 7, 1e-3, 0.0)], axis=1)
     target = 3.0 * columns[:, 0] + 0.1 * draw.normal(size=200)
     target[7] += 0.5
-    assert abs(regression.solve(columns, target)[1]) > 100
-    held = regression.bounded(columns, target, np.array([False, True]), 4.0)
+    assert abs(least_squares.solve(columns, target)[1]) > 100
+    held = least_squares.bounded(columns, target, np.array([False, True]), 4.0)
     assert abs(held[1]) == 4.0 and abs(held[0] - 3.0) < 0.05
     np.testing.assert_allclose(
-        regression.bounded(columns, target, np.array([False, False]), 4.0),
-        regression.solve(columns, target),
+        least_squares.bounded(columns, target, np.array([False, False]), 4.0),
+        least_squares.solve(columns, target),
     )
 
 

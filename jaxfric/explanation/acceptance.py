@@ -79,20 +79,20 @@ def least_gain(
     effect: Effect,
     before: Sequence[Effect],
     base: float,
-    left: float,
+    remaining: float,
     floor: float = LEAST_OF_BASE,
 ) -> float:
     """The energy that a term after others must remove, N².
 
-    **Arguments:** `before`: the effects selected already; `base` and `left`: the energy that the
-    base left, and that they leave; `floor`: the least part of the base's.
+    **Arguments:** `before`: the effects selected already; `base` and `remaining`: the energy of the
+    residual of the base, and beside those effects; `floor`: the least part of the base's.
     """
     again = any(earlier.at_reversals for earlier in before)
     if again and (effect.at_reversals or effect.isolated):
-        return min(REVERSAL_OF_BASE * base, NEARLY_ALL * left)
+        return min(REVERSAL_OF_BASE * base, NEARLY_ALL * remaining)
     if effect.leftover:
-        return min(EASY_OF_BASE * base, NEARLY_ALL * left)
-    return max(floor * base, min(OF_BASE * base, MOST * left))
+        return min(EASY_OF_BASE * base, NEARLY_ALL * remaining)
+    return max(floor * base, min(OF_BASE * base, MOST * remaining))
 
 
 def _again(finalist: Finalist, selected: list[SelectedTerm]) -> bool:
@@ -132,10 +132,10 @@ def _alike(finalist: Finalist, current: Fit, wide: Evidence, factor: float, leas
     seen = with_predictions(wide, less)
     # At the β of the narrow kernel: where the wide one leaves little, it would find another.
     term, beta, basis = finalist.trial.candidate.term, finalist.betas[-1], less.basis()
-    there = fit([term], seen, [beta], 0, basis)
-    ratio = np.linalg.norm(there.part(0)) / max(
-        float(np.linalg.norm(there.columns @ finalist.alpha)), 1e-300
+    wider_fit = fit([term], seen, [beta], 0, basis)
+    ratio = np.linalg.norm(wider_fit.part(0)) / max(
+        float(np.linalg.norm(wider_fit.columns @ finalist.alpha)), 1e-300
     )
-    positive = bool(np.all(there.alphas[0] > 0))
-    enough = less.energy - there.energy >= least * less.energy
+    positive = bool(np.all(wider_fit.alphas[0] > 0))
+    enough = less.energy - wider_fit.energy >= least * less.energy
     return positive and 1 / factor < ratio < factor and enough

@@ -15,8 +15,9 @@ from ..terms.base import AbstractTerm
 from . import parameters as spelled
 from .acceptance import LEAST_SHARE, LINEARITY
 from .evidence import Evidence
+from .least_squares import RANK, orthonormal, solve
 from .predictions import with_predictions
-from .regression import RANK, Fit, fit, orthonormal, solve
+from .regression import Fit, fit
 from .significance import LEVEL, BlockBootstrap, blocks
 
 
@@ -24,8 +25,8 @@ class Baseline(NamedTuple):
     """A sum of terms, its name, and its parameters where it comes with values.
 
     Of another recording also what it obeys, term by term, `fit`, and the standard errors of its
-    parameters, affine ones first, `(P,)`; `left`, the coordinates over which structure is left
-    there, and whether what is left is `rough`: neither is a difference.
+    parameters, affine ones first, `(P,)`; `structured`, the coordinates over which it leaves
+    structure, and whether its residual is `rough`: neither is a difference.
     """
 
     structure: AbstractTerm
@@ -33,7 +34,7 @@ class Baseline(NamedTuple):
     model: Model | None = None
     errors: np.ndarray | None = None
     fit: Fit | None = None
-    left: frozenset[str] = frozenset()
+    structured: frozenset[str] = frozenset()
     rough: bool = False
 
 
@@ -96,8 +97,8 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     start = Fit((term,), (beta,), (alpha,), empty, empty, evidence.target, 0.0)
     seen = with_predictions(evidence, start)
     columns = seen.columns(term, beta[None])[0]
-    left = evidence.target - columns @ alpha
-    return start._replace(columns=columns, residual=left, energy=float(left @ left))
+    residual = evidence.target - columns @ alpha
+    return start._replace(columns=columns, residual=residual, energy=float(residual @ residual))
 
 
 def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ...] = ()) -> Fit:
@@ -112,7 +113,7 @@ def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ..
     for i in free:
         if i >= count:
             searched[i - count] = current.betas[0][i - count]
-    kept = [i for i in range(count) if i not in free]
+    fixed = [i for i in range(count) if i not in free]
     for _ in range(2):  # some terms act on what the others predict
         seen = with_predictions(evidence, current)
         if others and not free:
@@ -122,16 +123,16 @@ def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ..
             )
         current = fit(current.terms, seen, (searched, *current.betas[1:]), 0)
         alpha = np.zeros(current.columns.shape[1])
-        alpha[kept] = given.alphas[0][kept]
-        open_ = [i for i in range(len(alpha)) if i not in kept]
+        alpha[fixed] = given.alphas[0][fixed]
+        open_ = [i for i in range(len(alpha)) if i not in fixed]
         alpha[open_] = solve(current.columns[:, open_], seen.target - current.columns @ alpha)
-        left = seen.target - current.columns @ alpha
+        residual = seen.target - current.columns @ alpha
         ends = np.cumsum([len(a) for a in current.alphas])[:-1]
         current = current._replace(
             betas=(searched, *current.betas[1:]),
             alphas=tuple(np.split(alpha, ends)),
-            residual=left,
-            energy=float(left @ left),
+            residual=residual,
+            energy=float(residual @ residual),
         )
     return current
 
@@ -211,14 +212,14 @@ def _different(
 
 def freed(current: Fit, free: Iterable[int]) -> Fit:
     """A fit of whose base only some values were fitted; what stayed has no error."""
-    kept, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
+    moved, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
     count, searched = len(current.alphas[0]), len(current.betas[0])
-    columns[:, [i for i in range(count) if i not in kept]] = 0.0
-    slopes[:, [i for i in range(searched) if count + i not in kept]] = 0.0
+    columns[:, [i for i in range(count) if i not in moved]] = 0.0
+    slopes[:, [i for i in range(searched) if count + i not in moved]] = 0.0
     return current._replace(columns=columns, slopes=slopes)
 
 
-def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
+def _fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
     """Numbers of the fewest columns that leave what all of them leave, N², but for `enough`.
 
     Of every size the best subset; none of whose columns is within its interval of nothing. Where
@@ -227,17 +228,17 @@ def _fewest(own: np.ndarray, left: np.ndarray, block: np.ndarray, enough: float)
     size = np.linalg.norm(own, axis=0)
     used = np.flatnonzero(size > 0)
     columns = own[:, used] / size[used]
-    gram, pull = columns.T @ columns, columns.T @ left
-    most = _taken(gram, pull, range(len(used)))
+    gram, pull = columns.T @ columns, columns.T @ residual
+    most = _removed(gram, pull, range(len(used)))
     found: tuple[int, ...] = ()
     for count in range(1, min(len(used), MOST_WRONG) + 1):
-        if most - _taken(gram, pull, found) < enough:
+        if most - _removed(gram, pull, found) < enough:
             break
         better = _best(gram, pull, count, found)
-        if not _sure(columns[:, better], left, block):
+        if not _sure(columns[:, better], residual, block):
             break
         found = better
-    if len(found) == MOST_WRONG and most - _taken(gram, pull, found) >= enough:
+    if len(found) == MOST_WRONG and most - _removed(gram, pull, found) >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
 
@@ -254,10 +255,10 @@ def _best(gram: np.ndarray, pull: np.ndarray, count: int, before: tuple[int, ...
     if math.comb(len(pull), count) <= MOST_SUBSETS:
         subsets = np.array(list(itertools.combinations(number, count)))
     else:
-        kept = [[*some, *more] for r in (1, 2) if r <= count
+        tried = [[*some, *more] for r in (1, 2) if r <= count
                 for some in itertools.combinations(before, count - r)
                 for more in itertools.combinations(sorted(set(number) - set(some)), r)]  # fmt: skip
-        subsets = np.unique(np.sort(np.array(kept)), axis=0)
+        subsets = np.unique(np.sort(np.array(tried)), axis=0)
     inner = gram[subsets[:, :, None], subsets[:, None, :]] + RIDGE * np.eye(count)
     outer = pull[subsets]
     gains = np.einsum("sk,sk->s", outer, np.linalg.solve(inner, outer[..., None])[..., 0])
@@ -265,13 +266,13 @@ def _best(gram: np.ndarray, pull: np.ndarray, count: int, before: tuple[int, ...
 
 
 def _instead(
-    own: np.ndarray, left: np.ndarray, block: np.ndarray, free: list[int], enough: float
+    own: np.ndarray, residual: np.ndarray, block: np.ndarray, free: list[int], enough: float
 ) -> dict[int, tuple[int, ...]]:
-    """Columns that would do as well in the place of one of those that are free."""
+    """Columns that would do as well instead of one of those that are free."""
     found: dict[int, tuple[int, ...]] = {}
     size = np.linalg.norm(own, axis=0)
     others = [j for j in range(own.shape[1]) if j not in free and size[j] > 0]
-    noise = left - own[:, free] @ solve(own[:, free], left)
+    noise = residual - own[:, free] @ solve(own[:, free], residual)
     if len(free) > MOST_WRONG:
         return found
     for i in free:
@@ -282,7 +283,7 @@ def _instead(
             basis = np.concatenate([rest, basis], axis=1)
             lone = own[:, i] - basis @ (basis.T @ own[:, i])
             lone = lone / max(float(np.linalg.norm(lone)), 1e-300)
-            part = float(lone @ left)
+            part = float(lone @ residual)
             spread = np.bincount(block, lone * noise, int(block[-1]) + 1)
             if abs(part) <= SURE * float(np.linalg.norm(spread)) or part**2 < enough:
                 alike.append(j)
@@ -291,8 +292,8 @@ def _instead(
     return found
 
 
-def _taken(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
-    """What some of the columns take off the energy of what is left."""
+def _removed(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
+    """By how much some of the columns lower the energy of the residual."""
     index = list(some)
     if not index:
         return 0.0
@@ -300,11 +301,11 @@ def _taken(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
     return float(solved @ pull[index])
 
 
-def _sure(columns: np.ndarray, left: np.ndarray, block: np.ndarray) -> bool:
+def _sure(columns: np.ndarray, residual: np.ndarray, block: np.ndarray) -> bool:
     """Whether each column's part is beyond noise like what all of them leave, by blocks."""
     inverse = np.linalg.pinv(columns, rcond=RANK)
-    parts = inverse @ left
-    noise = left - columns @ parts
+    parts = inverse @ residual
+    noise = residual - columns @ parts
     count = int(block[-1]) + 1
     sums = np.stack([np.bincount(block, row * noise, count) for row in inverse])
     return bool(np.all(np.abs(parts) > SURE * np.sqrt(np.sum(sums**2, axis=1))))

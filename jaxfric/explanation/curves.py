@@ -98,10 +98,10 @@ def _friction(models: tuple[Model, Model], evidence: Evidence, after: Fit) -> di
         low, high = np.quantile(side * speeds[rows], [0.01, 1.0])
         parts.append(np.sort(side * np.geomspace(low, high, 120)))
         bins = Bins(Axis("velocity", "", speeds[rows], np.ones(np.count_nonzero(rows))))
-        left = after.residual[rows]
+        residual = after.residual[rows]
         at += bins.at.tolist()
-        measured += bins.mean(slip[rows] + left).tolist()
-        error += bins.error(left).tolist()
+        measured += bins.mean(slip[rows] + residual).tolist()
+        error += bins.error(residual).tolist()
     velocity = np.concatenate(parts) if parts else np.zeros(0)
     curves = (np.asarray(model.friction(velocity)).tolist() for model in models)
     before, after_ = ([v if np.isfinite(v) else None for v in curve] for curve in curves)

@@ -30,8 +30,8 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     a constant load, which terms that know the direction take up, cancels. The slower and the
     faster half each count, since a line through both may be negative where nothing moved.
     """
-    places = _friction(current)
-    if not places:
+    index = _friction(current)
+    if not index:
         return False
     matrix = covariance(current, block)
     speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
@@ -42,8 +42,8 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
         if not (forward.any() and backward.any()):
             continue
         weights = np.zeros(len(matrix))
-        columns = current.columns[:, places]
-        weights[places] = (columns[forward].mean(axis=0) - columns[backward].mean(axis=0)) / 2
+        columns = current.columns[:, index]
+        weights[index] = (columns[forward].mean(axis=0) - columns[backward].mean(axis=0)) / 2
         seen = np.flatnonzero(weights)
         spread = matrix[np.ix_(seen, seen)]
         if not np.isfinite(spread).all():  # what is not visible may be anything
@@ -55,14 +55,14 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
 
 
 def _friction(current: Fit) -> list[int]:
-    """The places, among all affine parameters, of friction as a function of velocity alone."""
-    places, start = list[int](), 0
+    """Indices, among all affine parameters, of friction as a function of velocity alone."""
+    index, start = list[int](), 0
     leaves = (leaf for term in current.terms for leaf in summands(term))
     for leaf in leaves:
         if leaf.coordinates == {"velocity"}:
-            places += range(start, start + len(leaf.affine))
+            index += range(start, start + len(leaf.affine))
         start += len(leaf.affine)
-    return places
+    return index
 
 
 def accelerates(parameters: dict[str, Estimate]) -> bool:
@@ -170,17 +170,17 @@ def _plain_axis(evidence: Evidence) -> np.ndarray:
 
 
 def doubts(
-    current: Fit, view: Problem, parameters: dict[str, Estimate], error: float
+    current: Fit, problem: Problem, parameters: dict[str, Estimate], error: float
 ) -> list[Remark]:
     """What makes the model that is reported impossible for an axis.
 
-    **Arguments:** `current`, its fit, on the rows of `view`; `parameters` of its base, with all
+    **Arguments:** `current`, its fit, on the rows of `problem`; `parameters` of its base, with all
     their errors; `error`: its filtered force error.
     """
     remarks = []
     wrong = ["inertia"] * accelerates(parameters)
-    wrong += ["friction"] * drives(current, view.evidence, view.block)
-    if wrong and not _corrects(view.evidence):
+    wrong += ["friction"] * drives(current, problem.evidence, problem.block)
+    if wrong and not _corrects(problem.evidence):
         remarks.append(
             Remark(
                 "not_passive",

@@ -100,13 +100,13 @@ class Figures:
         """
         recording = self._recordings["here"]
         moving, force = self._samples("here", delay_of(model))
-        left = self._left(model, "here")
+        rest = self._left(model, "here")
         steps = np.diff(np.asarray(recording.time, float)[moving])
         steps = steps[steps > 0]
         count = max(1, round(lag / float(np.median(steps)))) if steps.size else 1
-        apart = np.abs(left[count:] - left[:-count])[moving[count:] & moving[:-count]]
+        apart = np.abs(rest[count:] - rest[:-count])[moving[count:] & moving[:-count]]
         if not apart.size:
             return float("nan")
         noise = float(np.median(apart)) / 0.6745 / np.sqrt(2)
-        both = noise, np.sqrt(np.mean(left[moving] ** 2))  # noise is no more than all of it
+        both = noise, np.sqrt(np.mean(rest[moving] ** 2))  # noise is no more than all of it
         return relative(np.full(int(moving.sum()), min(both)), force[moving])

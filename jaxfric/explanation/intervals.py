@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .regression import Fit, orthonormal
+from .least_squares import orthonormal
+from .regression import Fit
 
 
 def covariance(current: Fit, block: np.ndarray) -> np.ndarray:
@@ -45,16 +46,13 @@ def left_out(current: Fit, number: int, block: np.ndarray) -> float:
 
     **Arguments:** `number` of the term; `block`, the number of each row's block, `(J,)`.
     """
-    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
     mine = np.zeros(current.jacobian.shape[1], bool)
-    mine[affine[number] : affine[number + 1]] = True
-    mine[searched[number] : searched[number + 1]] = True
+    mine[current.indices(number)] = True
     basis = orthonormal(current.jacobian[:, mine], orthonormal(current.jacobian[:, ~mine]))
     starts = np.flatnonzero(np.diff(block, prepend=-1))
     power = 0.0
     for a, b in zip(starts, [*starts[1:], len(block)], strict=True):
-        own, left = basis[a:b], current.residual[a:b]
+        own, residual = basis[a:b], current.residual[a:b]
         pull = np.eye(own.shape[1]) - 0.95 * own.T @ own
-        power += float(np.sum((left + own @ np.linalg.solve(pull, own.T @ left)) ** 2))
+        power += float(np.sum((residual + own @ np.linalg.solve(pull, own.T @ residual)) ** 2))
     return power

@@ -15,9 +15,9 @@ def outstanding(evidence: Evidence, current: Fit) -> list[Candidate]:
     if not evidence.clock:
         return []
     known = {traits(term).name for term in current.terms}
-    left = _residual(evidence, current)
+    residual = _residual(evidence, current)
     others = [effect for effect in EFFECTS.values() if effect.name not in known]
-    best = (_best(effect, left, evidence, current) for effect in others)
+    best = (_best(effect, residual, evidence, current) for effect in others)
     return [candidate for candidate in best if candidate is not None]
 
 
@@ -36,9 +36,9 @@ def _residual(evidence: Evidence, current: Fit) -> Residual:
     )
 
 
-def _best(effect: Effect, left: Residual, evidence: Evidence, current: Fit) -> Candidate | None:
+def _best(effect: Effect, residual: Residual, evidence: Evidence, current: Fit) -> Candidate | None:
     most, found = 0.0, None
-    for term in effect.outstanding(left):
+    for term in effect.outstanding(residual):
         candidate = Candidate(effect, term, np.zeros((1, 0)))
         columns = candidate.columns(evidence)[0]
         gain = (

@@ -35,22 +35,20 @@ def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[di
     """The parameters of each term of a fit, waves by amplitude and phase too."""
     matrix = covariance(current, block)
     freedom = max(int(block[-1]) + 1 - matrix.shape[0] // 2, 3)
-    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
     result = []
     for n, term in enumerate(current.terms):
-        places = [*range(affine[n], affine[n + 1]), *range(searched[n], searched[n + 1])]
+        index = current.indices(n)
         values = [*current.alphas[n], *current.betas[n]]
-        named = {
+        plain = {
             p.name: Estimate(
                 np.float64(value),
-                np.float64(np.sqrt(matrix[place, place])),
+                np.float64(np.sqrt(matrix[i, i])),
                 spell(p.dimension, units),
                 freedom,
             )
-            for p, value, place in zip((*term.affine, *term.nonlinear), values, places, strict=True)
+            for p, value, i in zip((*term.affine, *term.nonlinear), values, index, strict=True)
         }
-        result.append(named | _waves(term, values, matrix[np.ix_(places, places)], named, freedom))
+        result.append(plain | _waves(term, values, matrix[np.ix_(index, index)], plain, freedom))
     return result
 
 
@@ -75,7 +73,7 @@ def may_be_none(term: AbstractTerm, known: dict[str, Estimate]) -> bool:
 _wave = programs.compiled(wave)
 
 
-def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
+def _waves(term, values, matrix, plain, freedom) -> dict[str, Estimate]:
     """Amplitude and phase of every pair of sine and cosine."""
     found = {}
     names = [p.name for p in term.affine]
@@ -85,7 +83,7 @@ def _waves(term, values, matrix, named, freedom) -> dict[str, Estimate]:
         harmonic = name.removesuffix("_sin").partition("_harmonic")[2]
         suffix = f"_harmonic{harmonic}" if harmonic else ""
         pair = _wave(*map(np.asarray, values[i : i + 2]), matrix[i : i + 2, i : i + 2])
-        unit, pair = named[name].unit, Wave(*map(np.asarray, pair))
+        unit, pair = plain[name].unit, Wave(*map(np.asarray, pair))
         found[f"amplitude{suffix}"] = Estimate(pair.amplitude, pair.amplitude_error, unit, freedom)
         found[f"phase{suffix}"] = Estimate(pair.phase, pair.phase_error, "rad", freedom)
     return found

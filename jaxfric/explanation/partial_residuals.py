@@ -85,9 +85,7 @@ def _band(along: Axis, law, slopes: np.ndarray, spread: np.ndarray) -> dict[str,
 
 def _parameters(current: Fit, index: int, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The derivatives of the force by one term's parameters, `(J, k)`, and their covariance."""
-    affine = np.cumsum([0, *(len(a) for a in current.alphas)])
-    searched = affine[-1] + np.cumsum([0, *(len(b) for b in current.betas)])
-    own = [*range(affine[index], affine[index + 1]), *range(searched[index], searched[index + 1])]
+    own = current.indices(index)
     return current.jacobian[:, own], covariance(current, block)[np.ix_(own, own)]
 
 

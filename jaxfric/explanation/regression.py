@@ -14,9 +14,9 @@ import numpy as np
 from ..terms.base import AbstractTerm, summands
 from ..units import FORCE
 from .evidence import Evidence
+from .least_squares import bounded, orthonormal
+from .parameter_space import Space
 
-# A column of which less than this is left after the others is not told from them.
-RANK = 1e-8
 GRID = 24
 ITERATIONS = 20
 
@@ -45,17 +45,24 @@ class Fit(NamedTuple):
         """An orthonormal basis of the Jacobian's span, `(J, r)`."""
         return orthonormal(self.jacobian)
 
-    def only(self, places: Sequence[int]) -> "Fit":
-        """The terms of those places with their parameters; whatever else is still of them all."""
+    def only(self, index: Sequence[int]) -> "Fit":
+        """The terms of those indices with their parameters; whatever else is still of them all."""
         terms, betas, alphas = (
-            tuple(values[i] for i in places) for values in (self.terms, self.betas, self.alphas)
+            tuple(values[i] for i in index) for values in (self.terms, self.betas, self.alphas)
         )
         return self._replace(terms=terms, betas=betas, alphas=alphas)
 
+    def indices(self, number: int) -> list[int]:
+        """Columns of the Jacobian that belong to a term, affine parameters first."""
+        affine = np.cumsum([0, *(len(a) for a in self.alphas)])
+        searched = affine[-1] + np.cumsum([0, *(len(b) for b in self.betas)])
+        pairs = (ends[number : number + 2] for ends in (affine, searched))
+        return [i for start, stop in pairs for i in range(start, stop)]
+
     def part(self, number: int) -> np.ndarray:
         """The force of one of the terms, `(J,)`."""
-        counts = np.cumsum([0, *(len(a) for a in self.alphas)])
-        return self.columns[:, counts[number] : counts[number + 1]] @ self.alphas[number]
+        ends = np.cumsum([0, *(len(a) for a in self.alphas)])
+        return self.columns[:, ends[number] : ends[number + 1]] @ self.alphas[number]
 
 
 def fast(current: Fit) -> float:
@@ -68,26 +75,6 @@ def fast(current: Fit) -> float:
     return float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(2))
 
 
-def orthonormal(columns: np.ndarray, basis: np.ndarray | None = None) -> np.ndarray:
-    """Orthonormal columns that span what `columns` add to `basis`, `(J, r)`."""
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    columns = columns[:, size > 0] / size[size > 0]
-    if basis is not None and basis.shape[1]:
-        columns = columns - basis @ (basis.T @ columns)
-        columns = columns - basis @ (basis.T @ columns)
-    if not columns.shape[1]:
-        return columns
-    left, values, _ = np.linalg.svd(columns, full_matrices=False)
-    return left[:, values > RANK]
-
-
-def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Least-squares coefficients, of least norm (in units of the columns) where not unique."""
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    size = np.where(size > 0, size, 1.0)
-    return np.linalg.lstsq(columns / size, target, rcond=RANK)[0] / size
-
-
 def _forces_of_bumps(terms: Sequence[AbstractTerm]) -> np.ndarray:
     """Which affine parameters are forces of friction with a shape that is searched, `(p,)`."""
     which = [
@@ -97,21 +84,6 @@ def _forces_of_bumps(terms: Sequence[AbstractTerm]) -> np.ndarray:
         for each in part.affine
     ]
     return np.array(which, bool)
-
-
-def bounded(columns: np.ndarray, target: np.ndarray, which: np.ndarray, peak: float) -> np.ndarray:
-    """As [`solve`][], some of the coefficients being no larger than `peak`.
-
-    An axis that moved was held by no more friction than the largest force there was. Between
-    reversals a filter sees next to nothing of a narrow bump and would take any height for it.
-    """
-    alpha = solve(columns, target)
-    held = np.zeros(len(alpha), bool)
-    while (beyond := which & ~held & (np.abs(alpha) > peak)).any():
-        held |= beyond
-        alpha = np.where(held, np.clip(alpha, -peak, peak), 0.0)
-        alpha[~held] = solve(columns[:, ~held], target - columns @ alpha)
-    return alpha
 
 
 class Beside:
@@ -148,41 +120,6 @@ class Remembered:
         return np.stack([self._known[key] for key in keys])
 
 
-class Space:
-    """The compact set of the nonlinear parameters of some terms, in coordinates from 0 to 1."""
-
-    def __init__(self, terms: Sequence[AbstractTerm], evidence: "Evidence | Beside | Remembered"):
-        limits = type(evidence.limits)(*map(np.asarray, evidence.limits))
-        boxes = [_box(term, limits) for term in terms]
-        self.counts = [len(term.nonlinear) for term in terms]
-        parameters = [p for term in terms for p in term.nonlinear]
-        self.log = np.array([p.logarithmic for p in parameters], bool)
-        box = np.concatenate(boxes, axis=1)
-        self.low = np.where(self.log, np.log(np.where(self.log, box[0], 1.0)), box[0])
-        self.high = np.where(self.log, np.log(np.where(self.log, box[1], 1.0)), box[1])
-        self.high = np.maximum(self.high, self.low + 1e-9 * (1 + np.abs(self.low)))
-
-    def beta(self, place: np.ndarray) -> np.ndarray:
-        """Parameters at coordinates, `(..., d)`."""
-        raw = self.low + place * (self.high - self.low)
-        return np.where(self.log, np.exp(np.where(self.log, raw, 0.0)), raw)
-
-    def place(self, beta: np.ndarray) -> np.ndarray:
-        """Coordinates of parameters, moved inside the set."""
-        raw = np.where(self.log, np.log(np.where(self.log, beta, 1.0)), beta)
-        return np.clip((raw - self.low) / (self.high - self.low), 0.0, 1.0)
-
-    def split(self, beta: np.ndarray) -> list[np.ndarray]:
-        """The vector of all parameters as one vector for each term."""
-        ends = np.cumsum(self.counts)
-        return [beta[..., e - c : e] for e, c in zip(ends, self.counts, strict=True)]
-
-
-def _box(term, limits):
-    pairs = [tuple(float(x) for x in p.bounds(limits)) for p in term.nonlinear]
-    return np.array(pairs, float).reshape(-1, 2).T
-
-
 def fit(
     terms: Sequence[AbstractTerm],
     evidence: Evidence,
@@ -198,19 +135,19 @@ def fit(
     """
     terms = tuple(terms)
     rows = Remembered(evidence if beside is None else Beside(evidence, beside))
-    space = Space(terms, rows)
+    space = Space(terms, rows.limits)
     if not sum(space.counts):
         return _at(terms, rows, space, np.zeros(0), derivatives=True)
-    place = np.full(sum(space.counts), 0.5)
+    point = np.full(sum(space.counts), 0.5)
     known = list(start) if start is not None else [None] * len(terms)
     unknown = [i for i, b in enumerate(known) if b is None]
     filled = [
-        p if b is None else b for b, p in zip(known, space.split(space.beta(place)), strict=True)
+        p if b is None else b for b, p in zip(known, space.split(space.beta(point)), strict=True)
     ]
-    place = space.place(np.concatenate(filled))
+    point = space.point(np.concatenate(filled))
     if unknown:
-        place = _scan(terms, rows, space, place, unknown)
-    return _refine(terms, rows, space, place, iterations)
+        point = _scan(terms, rows, space, point, unknown)
+    return _refine(terms, rows, space, point, iterations)
 
 
 def without(current: Fit, evidence: Evidence, number: int) -> Fit:
@@ -219,9 +156,9 @@ def without(current: Fit, evidence: Evidence, number: int) -> Fit:
     return fit([current.terms[i] for i in keep], evidence, [current.betas[i] for i in keep], 6)
 
 
-def _at(terms, evidence, space, place, derivatives=False) -> Fit:
+def _at(terms, evidence, space, point, derivatives=False) -> Fit:
     """The fit at given coordinates of β; with the derivatives by the coordinates' β."""
-    betas = space.split(space.beta(place))
+    betas = space.split(space.beta(point))
     step = 1e-4
     columns, moved = [], []
     for number, term in enumerate(terms):
@@ -229,7 +166,7 @@ def _at(terms, evidence, space, place, derivatives=False) -> Fit:
         if derivatives:
             offset = sum(space.counts[:number])
             for i in range(space.counts[number]):
-                shifted = place.copy()
+                shifted = point.copy()
                 back = shifted[offset + i] + step > 1.0
                 shifted[offset + i] += -step if back else step
                 grid.append(space.split(space.beta(shifted))[number])
@@ -251,20 +188,20 @@ def _at(terms, evidence, space, place, derivatives=False) -> Fit:
     return Fit(terms, tuple(betas), alphas, whole, jacobian, residual, float(residual @ residual))
 
 
-def _scan(terms, evidence, space, place, unknown):
+def _scan(terms, evidence, space, point, unknown):
     """Coordinates found one after the other, each by a grid with the others held, twice over."""
     owner = np.repeat(np.arange(len(terms)), space.counts)
-    free = [i for i in range(len(place)) if owner[i] in unknown]
+    free = [i for i in range(len(point)) if owner[i] in unknown]
     grid = (np.arange(GRID) + 0.5) / GRID
     for _ in range(2 if len(free) > 1 else 1):
         for i in free:
             number = owner[i]
-            tried = np.repeat(place[None, :], GRID, axis=0)
+            tried = np.repeat(point[None, :], GRID, axis=0)
             tried[:, i] = grid
             betas = space.split(space.beta(tried))[number]
             others = [
                 evidence.columns(t, b[None])[0]
-                for n, (t, b) in enumerate(zip(terms, space.split(space.beta(place)), strict=True))
+                for n, (t, b) in enumerate(zip(terms, space.split(space.beta(point)), strict=True))
                 if n != number
             ]
             fixed = orthonormal(np.concatenate([*others, np.zeros((len(evidence.target), 0))], 1))
@@ -273,48 +210,42 @@ def _scan(terms, evidence, space, place, unknown):
                 np.sum((orthonormal(rows, fixed).T @ left) ** 2)
                 for rows in evidence.columns(terms[number], betas)
             ]
-            place = place.copy()
-            place[i] = grid[int(np.argmax(gains))]
-    return place
+            point = point.copy()
+            point[i] = grid[int(np.argmax(gains))]
+    return point
 
 
-def _refine(terms, evidence, space, place, iterations):
+def _refine(terms, evidence, space, point, iterations):
     """Levenberg-Marquardt with Kaufman's Jacobian, inside the set."""
-    damping, best = 1e-3, _at(terms, evidence, space, place, derivatives=True)
+    damping, best = 1e-3, _at(terms, evidence, space, point, derivatives=True)
     for _ in range(iterations):
         basis = orthonormal(best.columns)
-        width = _rate(space, place)
+        width = space.rate(point)
         slopes = best.slopes * width
         slopes = slopes - basis @ (basis.T @ slopes)
         gram, pull = slopes.T @ slopes, slopes.T @ best.residual
         size = np.diag(gram).copy()
         size[size <= 0] = 1.0
         # A coordinate at its limit that is pulled outwards stays there.
-        stuck = ((place <= 0) & (pull < 0)) | ((place >= 1) & (pull > 0))
+        stuck = ((point <= 0) & (pull < 0)) | ((point >= 1) & (pull > 0))
         moving = ~stuck
         if not moving.any():
             break
         for _ in range(6):
-            step = np.zeros_like(place)
+            step = np.zeros_like(point)
             matrix = gram[np.ix_(moving, moving)] + damping * np.diag(size[moving])
             step[moving] = np.linalg.lstsq(matrix, pull[moving], rcond=None)[0]
             # A fifth of the set at most: Gauss-Newton knows no more than the neighbourhood.
             step *= min(1.0, 0.2 / max(np.max(np.abs(step)), 1e-300))
-            trial_place = np.clip(place + step, 0.0, 1.0)
-            trial = _at(terms, evidence, space, trial_place, derivatives=True)
+            trial_point = np.clip(point + step, 0.0, 1.0)
+            trial = _at(terms, evidence, space, trial_point, derivatives=True)
             if trial.energy < best.energy:
                 break
             damping *= 8
         else:
             break
         gained = best.energy - trial.energy
-        best, place, damping = trial, trial_place, max(damping / 8, 1e-9)
+        best, point, damping = trial, trial_point, max(damping / 8, 1e-9)
         if gained < 1e-6 * best.energy:
             break
     return best
-
-
-def _rate(space, place):
-    """dβ/d(coordinate)."""
-    span = space.high - space.low
-    return np.where(space.log, space.beta(place) * span, span)

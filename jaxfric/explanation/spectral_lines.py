@@ -157,11 +157,11 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     if not evidence.clock or scanned >= top:
         return _NONE
     time = np.asarray(evidence.motion.time)[evidence.centre]
-    place = np.round((time - time[0]) * 2 * top).astype(int)
-    if place[-1] > SPARSE * len(place):
+    cell = np.round((time - time[0]) * 2 * top).astype(int)
+    if cell[-1] > SPARSE * len(cell):
         return _NONE
-    series = np.zeros(OVERSAMPLING * (int(place[-1]) + 1))
-    series[place] = current.residual
+    series = np.zeros(OVERSAMPLING * (int(cell[-1]) + 1))
+    series[cell] = current.residual
     tones = np.fft.rfftfreq(len(series), 0.5 / top)
     above = tones > scanned
     power, tones = np.abs(np.fft.rfft(series)[above]) ** 2, tones[above]

@@ -59,13 +59,15 @@ def summarise(
         remarks = [*remarks, *_doubts(better)]
     errors = document(better, filtered, models[1], figures)
     remarks = [*remarks, *_elsewhere(errors)]
-    new, later = ([s for s in some if s.coordinate not in known.left] for some in (before, after))
+    new, later = (
+        [s for s in some if s.coordinate not in known.structured] for some in (before, after)
+    )
     much = (rough(filtered, shares) or beside_rows(errors)) and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     return Explanation(
         verdict=verdict_of(findings, new, later, much, standing, remarks, known.fit is not None),
-        where=structure.documents(before, findings, better.first, units, known.left),
+        where=structure.documents(before, findings, better.first, units, known.structured),
         findings=findings,
         not_confirmed=refuted,
         fit=errors,

@@ -135,8 +135,8 @@ class _Undoing:
         rest counts as if it were untouched. What else is in the rest is left by both ways alike.
         """
         problem, width = self.problem, width or self.problem.evidence.width
-        view = gather(_undone(self.motion, undo, time), width, problem.delay, problem.reversals)
-        current = fit(self.terms, with_predictions(view, self.known), self.betas, 3)
+        rows = gather(_undone(self.motion, undo, time), width, problem.delay, problem.reversals)
+        current = fit(self.terms, with_predictions(rows, self.known), self.betas, 3)
         before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
         left = float(np.mean(current.residual**2))
         noisy = min(self.power * after / left, 1.0) if left > 0 else 1.0
@@ -164,8 +164,8 @@ class _Undoing:
             else:
                 break
         for _ in range(PARABOLAS):
-            places = np.array([low, best, high])
-            time = _vertex(places, np.array([energy(place) for place in places]))
+            times = np.array([low, best, high])
+            time = _vertex(times, np.array([energy(each) for each in times]))
             if not low < time < high or abs(time - best) < CLOSE * best:
                 break
             better = energy(time) < energy(best)
@@ -176,10 +176,10 @@ class _Undoing:
         return energy(best), best
 
 
-def _vertex(places: np.ndarray, heights: np.ndarray) -> float:
+def _vertex(times: np.ndarray, heights: np.ndarray) -> float:
     """Where a parabola through three points is lowest; NaN where it is nowhere."""
-    middle, spread = places[1], places[2] - places[0]
-    square, slope, _ = np.polyfit((places - middle) / spread, heights / heights[1], 2)
+    middle, spread = times[1], times[2] - times[0]
+    square, slope, _ = np.polyfit((times - middle) / spread, heights / heights[1], 2)
     return float(middle - 0.5 * spread * slope / square) if square > 0 else float("nan")
 
 

@@ -30,22 +30,22 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     """
     here, held = fit["force_error"], fit["holdout_force_error"]
 
-    def above(view, size: float) -> bool:
-        return view["after"] > max(size * fit["noise_floor"], LINEARITY)
+    def above(pair, size: float) -> bool:
+        return pair["after"] > max(size * fit["noise_floor"], LINEARITY)
 
-    def left(view) -> float:
-        return (view["after"] / max(view["before"], 1e-300)) ** 2
+    def remaining(pair) -> float:
+        return (pair["after"] / max(pair["before"], 1e-300)) ** 2
 
     much, far = [here], False
     if held is not None:
         momentary = [share for name, share in shares.items() if EFFECTS[name].momentary]
-        excused = HALF_ROUGH**2 * (left(here) + sum(momentary)) if momentary else 0.0
-        much += [held] if left(held) > excused else []
+        excused = HALF_ROUGH**2 * (remaining(here) + sum(momentary)) if momentary else 0.0
+        much += [held] if remaining(held) > excused else []
         if not momentary:
             far = above(held, ROUGH)
     # The findings go from the mismatch to the noise, and less than half the way (in decades).
     halfway = np.sqrt(here["before"] * fit["noise_floor"])
-    many = any(left(view) > HALF**2 and above(view, HALF_ROUGH) for view in much)
+    many = any(remaining(pair) > HALF**2 and above(pair, HALF_ROUGH) for pair in much)
     many |= here["after"] > max(halfway, LINEARITY)
     return bool(above(here, ROUGH) or (shares and (many or far)))
 

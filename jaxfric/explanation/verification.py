@@ -33,7 +33,7 @@ def _there(
 ) -> tuple[np.ndarray, list[np.ndarray]]:
     """The [`residual`][] on a recording, and the affine parameters of each term there."""
     seen = with_predictions(evidence, current)
-    left, waves, alphas = evidence.target.copy(), [], list(current.alphas)
+    rest, waves, alphas = evidence.target.copy(), [], list(current.alphas)
     for number, (term, beta, alpha) in enumerate(
         zip(current.terms, current.betas, current.alphas, strict=True)
     ):
@@ -43,16 +43,16 @@ def _there(
         if number in rephased:
             waves.append((number, columns))
         else:
-            left -= columns @ alpha
+            rest -= columns @ alpha
     for number, columns in waves:
         alpha = np.array(alphas[number])
         for i in range(0, len(alpha), 2):
-            free = np.linalg.lstsq(columns[:, i : i + 2], left, rcond=None)[0]
+            free = np.linalg.lstsq(columns[:, i : i + 2], rest, rcond=None)[0]
             size = np.hypot(*alpha[i : i + 2]) / max(float(np.hypot(*free)), 1e-300)
             alpha[i : i + 2] = free * size
-            left = left - columns[:, i : i + 2] @ alpha[i : i + 2]
+            rest = rest - columns[:, i : i + 2] @ alpha[i : i + 2]
         alphas[number] = alpha
-    return left, alphas
+    return rest, alphas
 
 
 def at_phase(current: Fit, evidence: Evidence, rephased: frozenset[int]) -> Fit:
@@ -80,7 +80,7 @@ def error(current: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset
     Found terms that time alone drives count where they return, and not where they do not; tones may
     return at another phase.
     """
-    power = min(float(left @ left) for left, _, _ in _ways(current, evidence, rephased))
+    power = min(float(rest @ rest) for rest, _, _ in _ways(current, evidence, rephased))
     return float(np.sqrt(power / max(evidence.force @ evidence.force, 1e-300)))
 
 
@@ -109,19 +109,21 @@ def _ways(current: Fit, evidence: Evidence, rephased: frozenset[int]):
     return [(*_there(current, evidence, anew, skipped), skipped) for anew, skipped in ways]
 
 
-def lacking(named: Selection, evidence: Evidence, number: int) -> Fit:
-    """The model refitted without the found term of that number; the base where it is not kept."""
-    less = without(named.last, evidence, named.term_index(number))
-    return less if named.given is None else as_given(named.given, less, evidence, named.free)
+def lacking(selection: Selection, evidence: Evidence, number: int) -> Fit:
+    """The model refitted without the found term of that number; a base as given stays."""
+    less = without(selection.last, evidence, selection.term_index(number))
+    if selection.given is None:
+        return less
+    return as_given(selection.given, less, evidence, selection.free)
 
 
 def share(
     less: Fit, more: Fit, base: Fit, evidence: Evidence, rephased: frozenset[int] = frozenset()
 ) -> float:
     """Part of the base's mean-square residual elsewhere that `more` removes beyond `less`."""
-    left, right = residuals(less, more, (evidence, evidence), rephased)
+    rest, right = residuals(less, more, (evidence, evidence), rephased)
     power = float(np.sum(residual(base, evidence) ** 2))
-    return float(np.sum(left**2) - np.sum(right**2)) / power
+    return float(np.sum(rest**2) - np.sum(right**2)) / power
 
 
 def nearer(more: np.ndarray, less: np.ndarray) -> bool:
@@ -136,9 +138,9 @@ def nearer(more: np.ndarray, less: np.ndarray) -> bool:
 
 
 def residuals(
-    less: Fit, more: Fit, views: tuple[Evidence, Evidence], rephased: frozenset[int]
+    less: Fit, more: Fit, rows: tuple[Evidence, Evidence], rephased: frozenset[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of two fits, each on its view of another recording, with nothing refitted.
+    """Residuals of two fits, each on its rows of another recording, with nothing refitted.
 
     Terms of a moment are left out unless they return there, tones at any phase, but for what tells
     the two apart.
@@ -156,8 +158,8 @@ def residuals(
 
     def pair(skipped, anew) -> tuple[np.ndarray, np.ndarray]:
         return (
-            residual(less, views[0], others | anew[0], skipped[0]),
-            residual(more, views[1], rephased | anew[1], skipped[1]),
+            residual(less, rows[0], others | anew[0], skipped[0]),
+            residual(more, rows[1], rephased | anew[1], skipped[1]),
         )
 
     none = [frozenset[int]()] * 2
@@ -188,9 +190,9 @@ def noise(current: Fit, reference: np.ndarray) -> float:
 
 
 def smallest_visible(contest: Contest, current: Fit) -> dict[str, float]:
-    """The smallest force, N rms in slip, of each effect that would have been named, by effect.
+    """The smallest force, N rms in slip, of each effect that would have been found, by effect.
 
-    A term is named if its R² is over what chance gives at the highest of all draws and over
+    A term is selected if its R² is above that of the highest of all draws and above
     `LEAST_SHARE`; the least of an effect's shapes counts.
     """
     level = float(np.sqrt(current.energy / len(current.residual)))

@@ -11,8 +11,8 @@ from ...simulators import AbstractSimulator
 from ...terms import KNOWN_FORCE
 from ..acceptance import LINEARITY
 from ..evidence import Evidence, gather
+from ..least_squares import RANK, orthonormal
 from ..motion import motion_of
-from ..regression import RANK, orthonormal
 from ..significance import blocks
 
 

@@ -1,0 +1,41 @@
+"""Linear least squares of columns of any size, of full rank or not."""
+
+import numpy as np
+
+# A column of which less than this remains beside the others is not independent of them.
+RANK = 1e-8
+
+
+def orthonormal(columns: np.ndarray, basis: np.ndarray | None = None) -> np.ndarray:
+    """Orthonormal columns that span what `columns` add to `basis`, `(J, r)`."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    columns = columns[:, size > 0] / size[size > 0]
+    if basis is not None and basis.shape[1]:
+        columns = columns - basis @ (basis.T @ columns)
+        columns = columns - basis @ (basis.T @ columns)
+    if not columns.shape[1]:
+        return columns
+    left, values, _ = np.linalg.svd(columns, full_matrices=False)
+    return left[:, values > RANK]
+
+
+def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Least-squares coefficients, of least norm (in units of the columns) where not unique."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1.0)
+    return np.linalg.lstsq(columns / size, target, rcond=RANK)[0] / size
+
+
+def bounded(columns: np.ndarray, target: np.ndarray, which: np.ndarray, peak: float) -> np.ndarray:
+    """As [`solve`][], some of the coefficients being no larger than `peak`.
+
+    An axis that moved was held by no more friction than the largest force there was. Between
+    reversals a filter sees next to nothing of a narrow bump and would take any height for it.
+    """
+    alpha = solve(columns, target)
+    held = np.zeros(len(alpha), bool)
+    while (beyond := which & ~held & (np.abs(alpha) > peak)).any():
+        held |= beyond
+        alpha = np.where(held, np.clip(alpha, -peak, peak), 0.0)
+        alpha[~held] = solve(columns[:, ~held], target - columns @ alpha)
+    return alpha
