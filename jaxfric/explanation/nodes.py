@@ -24,7 +24,7 @@ def node_signals(
     `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
     """
     time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
-    linked = _continuous(time, mask, np.asarray(recording.segment), limits.interval)
+    linked = signals.host_continuous(recording, limits.interval)
     run = np.pad(np.cumsum(~linked), (1, 0))
     steps = np.where(linked, np.diff(time), limits.interval)
     series = {
@@ -67,13 +67,6 @@ def node_signals(
     return means | {"run": label}
 
 
-def _continuous(time, mask, segment, interval) -> np.ndarray:
-    """As [`continuous`][jaxfric.signals.continuous], on the host."""
-    steps = np.diff(time)
-    together = mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
-    return together & (steps > 0) & (steps <= signals.GAP_FACTOR * interval)
-
-
 def _shifted(time, force, run, delay):
     """The force `delay` later, s: u(t + delay), inside each run."""
     late = np.interp(time + delay, time, force) if np.all(np.diff(time) > 0) else None
@@ -94,13 +87,11 @@ def windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
     even = np.arange(-NODES, NODES + 1) * reach / NODES
     offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
     offset = np.where(whole[:, None], offset, even[None, :])
-    tau = offset / reach
-    average = np.maximum(1 - tau**2, 0.0) ** 4
-    slope = 8 * tau * np.maximum(1 - tau**2, 0.0) ** 3
-    average /= average.sum(axis=1, keepdims=True)
-    slope -= average * slope.sum(axis=1, keepdims=True)
-    slope /= np.sum(slope * offset, axis=1, keepdims=True)
-    return index, whole, average, slope
+    slope = signals.kernel_slope(offset / reach)
+    average, slope = signals.kernel_weights(
+        signals.kernel(offset / reach).T, slope.T, np.sum(slope * offset, axis=1)
+    )
+    return index, whole, np.ascontiguousarray(average.T), np.ascontiguousarray(slope.T)
 
 
 def averaged(weights: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..signals import kernel_slope
 from ..terms import KNOWN_FORCE
 from ..terms.effects import traits
 from .evaluation import PAIR, evaluate
@@ -52,7 +53,7 @@ def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
     """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`."""
     spacing = evidence.reach / NODES
     tau = np.arange(-NODES, NODES + 1) / NODES
-    weight = 8 * tau * (1 - tau**2) ** 3
+    weight = kernel_slope(tau)
     weight = weight / np.sum(weight * tau * evidence.reach)
     out = np.convolve(values, weight[::-1], "same")
     # Where the kernel reaches across an interruption, or beyond the ends: the near difference.

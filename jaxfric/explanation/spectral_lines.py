@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..signals import kernel
 from .evidence import Evidence
 from .regression import Fit
 from .significance import LEVEL
@@ -69,7 +70,7 @@ def angle(turns: np.ndarray) -> np.ndarray:
 def _transform():
     """∫ φ(τ) cos(zτ) dτ / ∫ φ dτ of the kernel φ = (1 − τ²)⁴, for z up to 30 (below 1e-4 there)."""
     tau = np.linspace(-1.0, 1.0, 1001)
-    weight = (1 - tau**2) ** 4
+    weight = kernel(tau)
     turns = np.linspace(0.0, 30.0, 601)
     gains = np.cos(turns[:, None] * tau[None, :]) @ weight / np.sum(weight)
     gains[-1] = 0.0

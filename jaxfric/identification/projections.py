@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from ..signals import continuous, interval, kernel, kernel_slope
+from ..signals import continuous, interval, kernel, kernel_slope, kernel_weights
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -270,10 +270,7 @@ def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int
 
     # One offset after the other: together the slices were a gather of every sample.
     average, slope, rise = jax.lax.map(weigh, jnp.arange(-half_width, half_width + 1))
-    mass, rise = jnp.sum(average, axis=0), jnp.sum(rise, axis=0)
-    average = average / jnp.where(mass > 0, mass, 1.0)[None, :]
-    slope = slope / jnp.where(rise != 0, rise, 1.0)[None, :]
-    slope = slope.at[half_width].add(-jnp.sum(slope, axis=0))
+    average, slope = kernel_weights(average, slope, jnp.sum(rise, axis=0))
     return Filter(average, slope, half_width, stride)
 
 

@@ -9,6 +9,11 @@ from .clock import (
     is_traced as is_traced,
     quantile as quantile,
 )
+from .kernels import (
+    kernel as kernel,
+    kernel_slope as kernel_slope,
+    kernel_weights as kernel_weights,
+)
 from .motion import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     SLIP_SHARE as SLIP_SHARE,
@@ -22,8 +27,6 @@ from .motion import (
 from .parabolas import (
     TRACED_REACH as TRACED_REACH,
     choose_half_width as choose_half_width,
-    kernel as kernel,
-    kernel_slope as kernel_slope,
     local_quadratic as local_quadratic,
     white_noise as white_noise,
 )

@@ -9,20 +9,11 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from .clock import continuous, interval
+from .kernels import kernel
 from .polynomial import COLOURED, HALF_WIDTHS, weights
 
 # Inside jax.jit the width is data while the loop length is not, so the ladder ends earlier there.
 TRACED_REACH = 64
-
-
-def kernel(tau: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    """The smooth compact kernel φ(τ) = (1 − τ²)⁴ for |τ| < 1, else 0 (Messenger & Bortz 2021)."""
-    return jnp.maximum(1 - tau**2, 0.0) ** 4
-
-
-def kernel_slope(tau: Float[Array, "*n"]) -> Float[Array, "*n"]:
-    """dφ/dτ of [`kernel`][]."""
-    return -8 * tau * jnp.maximum(1 - tau**2, 0.0) ** 3
 
 
 def local_quadratic(
