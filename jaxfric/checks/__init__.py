@@ -9,7 +9,8 @@ from .kinds import (
     places as places,
     remarks as remarks,
 )
-from .recorded import LONE as LONE, lone as lone, recorded as recorded
+from .lone import LONE as LONE, lone as lone
+from .recorded import recorded as recorded
 from .structure import hides as hides
 
 

@@ -1,0 +1,27 @@
+"""Lone samples that no motion or actuator made, and how many samples a test needs."""
+
+import numpy as np
+
+# A drive's peak force is three to four times what it works with: a lone sample ten times beyond all
+# but a thousandth of the others was made by no actuator.
+LONE, BEYOND, RAREST = 3, 10.0, 1e-3
+# Samples in a span over which a force and what the velocity gains are compared.
+SPAN = 16
+# Pieces of fewer samples hold no kernel.
+PIECE = 32
+# The shortest kernel of the weak form reaches 16 samples each way: of a cycle that is no longer it
+# averages most of the motion away.
+CYCLE = 16
+
+
+def lone(values: np.ndarray) -> np.ndarray:
+    """Samples that no motion or actuator made: at most three in a row, far beyond all others."""
+    size = np.abs(values - np.median(values))
+    at = len(size) - 1 - max(LONE, int(RAREST * len(size)))
+    usual = np.partition(size, at)[at]
+    far = (size > BEYOND * usual) & (usual > 0)
+    ends = np.flatnonzero(np.diff(np.pad(far, 1).astype(np.int8)))
+    for first, last in zip(ends[::2], ends[1::2], strict=True):
+        if last - first > LONE:
+            far[first:last] = False
+    return far

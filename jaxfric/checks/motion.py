@@ -1,0 +1,177 @@
+"""Faults that clock, position and velocity of a recording show by themselves, on the host."""
+
+import numpy as np
+
+from .. import signals
+from ..data.recording import Recording
+from ..signals.polynomial import white_noise
+from .lone import CYCLE, LONE, PIECE, SPAN, lone
+
+# A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
+# small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
+UNCERTAIN = 0.01 / 2**0.5
+# The position's increments that a velocity is compared with are this many times their noise.
+ABOVE_NOISE = 30.0
+# Two columns with less than half of their power in common are not the same motion.
+UNRELATED = 0.5
+# A drive's own filter and scaling leave a recorded velocity within a few hundredths; by a quarter
+# it is no filter's doing.
+GAIN, SCALE = 1.05, 1.25
+# A delay counts where it takes 0.2 % of the power that position and velocity share: 2.5° at their
+# frequency, by which a twentieth of the inertia's force is taken for viscous friction.
+LATE = 0.002
+# The fastest linear drives reach 20 m/s, the fastest spindles 30 000 rad/s.
+FASTEST = {"m": 50.0, "rad": 5e4}
+# A velocity that errs by half of its size is noise.
+NOISE_ONLY = 0.5
+# Eight tenths of the means of the speed within a tenth of it leave friction's slope and the
+# acceleration to the noise.
+ONE_SPEED = 1.1
+# Moving is what is faster than a twentieth of the top speed; of a direction that takes less than a
+# hundredth of that there are but the turns of the other one.
+MOVING, RARE = 0.05, 0.01
+
+
+def clock_faults(recording: Recording) -> dict[str, float]:
+    """Into how many pieces a clock that is broken cuts the recording."""
+    linked = signals.host_continuous(recording, signals.host_interval(recording))
+    valid = int(np.count_nonzero(np.asarray(recording.mask)))
+    pieces = valid - int(np.count_nonzero(linked))
+    return {"broken_clock": pieces} if pieces > 1 and valid / pieces < PIECE else {}
+
+
+def jumps(recording: Recording, velocity: np.ndarray) -> int:
+    """Lone samples of a recorded velocity that are further from both neighbours than the top speed;
+    a jump of the acceleration, as at a reversal, is far less.
+    """
+    linked = signals.host_continuous(recording, signals.host_interval(recording))
+    bend = np.diff(velocity, 2)[linked[1:] & linked[:-1]]
+    bend = bend[np.isfinite(bend)]
+    if len(bend) <= 2 * LONE:
+        return 0
+    top = np.nanquantile(np.abs(velocity), 0.98)
+    return -(-int(np.count_nonzero(lone(bend) & (np.abs(bend) > top))) // LONE)
+
+
+def coarse(recording: Recording, velocity: np.ndarray) -> dict[str, float]:
+    """Samples a cycle of a recorded velocity, at the root mean square of its frequency, if few."""
+    linked = signals.host_continuous(recording, signals.host_interval(recording))
+    step, speed = np.diff(velocity)[linked], velocity[np.asarray(recording.mask)]
+    power, size = np.nanmean(step**2) if len(step) else 0.0, np.nanmean(speed**2)
+    if not power > 0 or not size > 0:
+        return {}
+    cycle = float(2 * np.pi * np.sqrt(size / power))
+    return {"few_samples_a_cycle": cycle} if cycle < CYCLE else {}
+
+
+def speed_faults(velocity: np.ndarray, valid: np.ndarray, unit: str) -> dict[str, float]:
+    """Magnitude of the speed, and whether it is one speed or one direction only."""
+    speed = np.abs(velocity[valid])
+    if not len(speed):
+        return {}
+    top = float(np.quantile(speed, 0.98))
+    found = {}
+    if top > FASTEST.get(unit, np.inf):
+        found["magnitude"] = top
+    # Means over spans, since the noise of single samples is no other speed.
+    count = len(velocity) // SPAN
+    whole = valid[: count * SPAN].reshape(count, SPAN).all(axis=1)
+    means = velocity[: count * SPAN].reshape(count, SPAN)[whole].mean(axis=1)
+    moving = np.abs(means[np.abs(means) > MOVING * top])
+    low, high = np.quantile(moving, (0.1, 0.9)) if len(moving) > LONE else (0.0, 1.0)
+    if high < ONE_SPEED * low:
+        found["one_speed"] = high / low - 1
+    slips = velocity[valid & (np.abs(velocity) > MOVING * top)]
+    share = np.mean(slips > 0) if len(slips) else 0.5
+    if min(share, 1 - share) < RARE:
+        found["one_direction"] = float(min(share, 1 - share))
+    return found
+
+
+def position_faults(recording: Recording) -> dict[str, float]:
+    """Lone samples of the position: one such makes its second difference g, −2 g, g."""
+    position, time = np.asarray(recording.position, float), np.asarray(recording.time, float)
+    linked = signals.host_continuous(recording, signals.host_interval(recording))
+    whole = linked[1:] & linked[:-1]
+    bend = np.diff(position, 2) / np.maximum(np.diff(time)[1:] + np.diff(time)[:-1], 1e-300)
+    bend = bend[whole & np.isfinite(bend)]
+    if len(bend) <= 2 * LONE:
+        return {}
+    count = int(np.count_nonzero(lone(bend)))
+    found = {"position_spikes": float(-(-count // LONE))} if count else {}
+    goal = recording.channels.get("reference")
+    if goal is not None and np.array_equal(np.asarray(goal, float), position, equal_nan=True):
+        found["position_is_reference"] = 1.0
+    return found
+
+
+def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str, float]:
+    """Whether the derived velocity is noise, or off by more than a hundredth."""
+    size = float(np.sqrt(np.mean(velocity**2))) if len(velocity) else 0.0
+    if size == 0 or choice.error > NOISE_ONLY * size:
+        return {"no_motion": 0.0}
+    if choice.error <= UNCERTAIN * size:
+        return {}
+    # Of bias and noise the larger one names it.
+    biased = choice.bias**2 > 0.5 * choice.error**2
+    return {"coarse_sampling" if biased else "velocity_noise": choice.error / size}
+
+
+def compared(recording: Recording) -> dict[str, float]:
+    """The recorded velocity's integral beside the position's increments, over the same spans."""
+    moved, driven, step = _increments(recording)
+    if len(moved) < 32 or not (np.any(moved) and np.any(driven)):
+        return {}
+    shared, lag = _correlation(moved, driven)
+    at_once = float(moved @ driven / np.sqrt((moved @ moved) * (driven @ driven)))
+    if abs(at_once) < UNRELATED**0.5:
+        return {"velocity_unrelated": at_once**2}
+    if shared < 0:
+        return {"velocity_sign": shared}
+    found = {}
+    if shared**2 - at_once**2 > LATE and abs(lag) > 1:
+        found["velocity_late"] = lag * step
+    late = slice(lag, None) if lag >= 0 else slice(None, lag)
+    early = slice(None, len(moved) - lag) if lag >= 0 else slice(-lag, None)
+    a, b = moved[early], driven[late]
+    gain = float(a @ a / (a @ b)) if a @ b else np.inf
+    off = abs(np.log(gain)) if gain > 0 and np.isfinite(gain) else 0.0
+    if off > np.log(SCALE):
+        return {"velocity_scale": gain}
+    return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
+
+
+def _increments(recording: Recording) -> tuple[np.ndarray, np.ndarray, float]:
+    """What the position and the velocity say the axis moved in spans that stand out of the noise,
+    both `(n,)` and unbroken, and the sampling interval, s.
+    """
+    position, velocity = (np.asarray(x, float) for x in (recording.position, recording.velocity))
+    typical = signals.host_interval(recording)
+    linked = signals.host_continuous(recording, typical)
+    linked &= np.isfinite(position[1:] + position[:-1] + velocity[1:] + velocity[:-1])
+    steps = np.where(linked, np.diff(np.asarray(recording.time, float)), 0.0)
+    mean = np.where(linked, 0.5 * (velocity[1:] + velocity[:-1]), 0.0)
+    moved = np.concatenate([[0], np.cumsum(np.where(linked, np.diff(position), 0.0))])
+    driven = np.concatenate([[0], np.cumsum(mean * steps)])
+    noise, span = white_noise(position[np.asarray(recording.mask)]), 4
+    while (
+        span < len(moved) // 16
+        and float(np.std(moved[span:] - moved[:-span])) < ABOVE_NOISE * noise
+    ):
+        span *= 2
+    return moved[span:] - moved[:-span], driven[span:] - driven[:-span], typical
+
+
+def _correlation(moved: np.ndarray, driven: np.ndarray) -> tuple[float, int]:
+    """The largest correlation, by magnitude, and by how many samples the second is late there."""
+    length = 1 << (2 * len(moved) - 1).bit_length()
+    product = np.conj(np.fft.rfft(moved, length)) * np.fft.rfft(driven, length)
+    cross = np.fft.irfft(product, length) / np.sqrt((moved @ moved) * (driven @ driven))
+    most = len(moved) // 4  # beyond, too little of the two overlaps
+    lags = np.concatenate([np.arange(most), np.arange(-most, 0)])
+    near = cross[lags]
+    if abs(cross[0]) > 0.7:  # the same motion: a delay by a whole period is none
+        lags = lags[np.sign(near) == np.sign(cross[0])]
+        near = cross[lags]
+    best = int(np.argmax(np.abs(near)))
+    return float(near[best]), int(lags[best])
