@@ -16,7 +16,7 @@ import pytest
 from jaxfric import cli, fleet
 from jaxfric.cli import main
 from jaxfric.cli.fleet import span
-from jaxfric.cli.options import process
+from jaxfric.cli.values import process
 from jaxfric.data import io
 from jaxfric.fleet import batches, comparing, files as listing, journal, tables
 

@@ -18,7 +18,9 @@ from .. import models as known
 from ..data import summary
 from ..data.excerpt import MOST, excerpt
 from ..data.io import read_with_notes, write_bytes, write_table, write_text
+from ..data.printable import printable
 from ..data.recording import Recording, uniform
+from ..data.targets import standard
 from ..data.writing import csv_text
 from ..identification import documents, tabulate
 from ..identification.breakaway import breakaway
@@ -32,7 +34,7 @@ from ..models import Model
 from ..signals import kernel_half_width, prepare
 from ..simulation.prediction import delay_of, force_error, in_motion, relative, residual
 from ..units import SI
-from .options import message, printable, say, standard
+from .messages import message, say
 
 
 def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[str]]:

@@ -11,7 +11,7 @@ from ..simulation.prediction import force_error
 from ..validation import concealed
 from . import commands
 from .commands import today
-from .options import say
+from .messages import say
 
 # One of the random machines: a linear axis of 57 mm stroke, 1.1 kHz, with an encoder and noise.
 SEED = 868

@@ -15,7 +15,7 @@ from ..looks.text import Table, text
 from ..models import Model
 from ..terms.effects import effect
 from .commands import _load, put, put_table
-from .options import say
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

@@ -5,7 +5,7 @@ from argparse import Namespace
 from ..identification import documents
 from ..terms import glossary
 from .commands import put
-from .options import say
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..data.provenance import sha256
 from ..data.recording import Recording, check_same_units
+from ..data.targets import standard
 from ..explanation import Earlier, Explanation, explain
 from ..explanation.baseline import baseline_of
 from ..explanation.quantities import per_pole_pair
@@ -22,7 +23,7 @@ from ..terms import KNOWN_FORCE
 from ..terms.effects import EFFECTS
 from . import benefit, robot
 from .commands import put, read, today, working
-from .options import say, standard
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

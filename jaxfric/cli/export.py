@@ -5,11 +5,12 @@ import textwrap
 from argparse import Namespace
 
 from ..data.io import write_bytes
+from ..data.targets import standard
 from ..export import Exported, export
 from ..models import Model
 from ..units import VELOCITY, spell
 from .commands import _in_units, _load, put, read
-from .options import say, standard
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

@@ -14,7 +14,7 @@ from ..data.io import write_bytes
 from ..data.targets import same
 from ..fleet import journal, running, tables, telling
 from .commands import check_bounds, show_progress
-from .options import say
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

@@ -1,20 +1,24 @@
-"""Values of the command's options, and the message of an error. Imports nothing heavy."""
+"""Options that several commands share, and a check of what they read and write."""
 
 import math
 import os
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from pathlib import Path
-from typing import TextIO
+from argparse import ArgumentParser, Namespace
 
-from ..data.nearest import meant as meant
-from ..data.printable import printable
 from ..data.targets import replaced, same, standard
-
-# Gains of each controller that `simulate` knows; `limit` bounds the force of any of them.
-CONTROLLERS = {"pd": ("kp", "kd"), "pid": ("kp", "ki", "kd"), "cascade": ("kp", "kv")}
-TABLES = (".csv", ".npz", ".parquet")
-PICTURES = ("png", "pdf", "svg")
-
+from .values import (
+    bounds,
+    count,
+    factors,
+    names,
+    number,
+    output,
+    picture,
+    positive,
+    process,
+    rate,
+    seconds,
+    sizes,
+)
 
 # What the options of every command read, and what they write.
 READ = (
@@ -24,25 +28,13 @@ READ = (
 WRITTEN = ("out", "json", "save", "report", "plot", "c")
 
 
-def say(text: str, end: str = "\n", file: TextIO | None = None) -> None:
-    """Print lines for a person, in which nothing from outside steers the terminal."""
-    print(printable(text, keep="\n"), end=end, file=file)
-
-
-def message(error: BaseException) -> str:
-    """What an error says, in one line, with the file's name where the system reports one."""
-    if isinstance(error, OSError) and error.filename is not None:
-        return printable(f"{os.fsdecode(error.filename)}: {error.strerror or error}")
-    return printable(str(error) or type(error).__name__)
-
-
 def check_outputs(arguments: Namespace) -> None:
     """Raises `ValueError` where one output would replace another, or an input."""
     given = vars(arguments)
     outputs = {f"--{name}": given[name] for name in WRITTEN if given.get(name)}
     files = [path for name in READ for path in _texts(given.get(name)) if os.path.isfile(path)]
-    for number, (option, path) in enumerate(outputs.items()):
-        for other, there in list(outputs.items())[:number]:
+    for index, (option, path) in enumerate(outputs.items()):
+        for other, there in list(outputs.items())[:index]:
             if same(path, there) and _kept(path):
                 raise ValueError(f"{other} and {option} are both {path}; give each its own.")
         if any(same(path, there) for there in files):
@@ -57,158 +49,6 @@ def _texts(value: object) -> list[str]:
 def _kept(path: str) -> bool:
     """Whether what is written there stays: standard output and files, not the null device."""
     return standard(path) or replaced(path) is not None
-
-
-def names(text: str) -> dict[str, str]:
-    """`a=b,c=d` as a mapping."""
-    pairs = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
-        key, equals, value = item.partition("=")
-        if not equals or not key.strip():
-            raise ArgumentTypeError(f"{item!r} is not of the form NAME=VALUE")
-        pairs[key.strip()] = value.strip()
-    return pairs
-
-
-def number(text: str) -> float:
-    """A finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ArgumentTypeError(f"{text!r} is not a number")
-    return value
-
-
-def factors(text: str) -> dict[str, float]:
-    """`a=1.5,b=2` as a mapping to numbers."""
-    return {name: number(value) for name, value in names(text).items()}
-
-
-def bounds(text: str) -> dict[str, tuple[float, float]]:
-    """`a=low:high,…` as a mapping to pairs of numbers."""
-    found = {}
-    for name, span in names(text).items():
-        low, colon, high = span.partition(":")
-        limits = (number(low), number(high)) if colon else (1.0, 0.0)
-        if not limits[0] < limits[1]:
-            raise ArgumentTypeError(f"{name}={span} is not of the form NAME=LOW:HIGH")
-        found[name] = limits
-    return found
-
-
-def span(text: str) -> tuple[float, float]:
-    """`low:high` as a pair of numbers, the second the larger."""
-    low, colon, high = text.partition(":")
-    limits = (number(low), number(high)) if colon else (1.0, 0.0)
-    if not limits[0] < limits[1]:
-        raise ArgumentTypeError(f"{text!r} is not of the form LOW:HIGH")
-    return limits
-
-
-def controller(text: str) -> tuple[str, dict[str, float]]:
-    """`kind:gain=value,…` as the kind and its gains, all of them given."""
-    kind, _, rest = text.partition(":")
-    if kind not in CONTROLLERS:
-        raise ArgumentTypeError(f"there is no {kind!r}; there are {', '.join(CONTROLLERS)}")
-    gains = factors(rest)
-    wanted = CONTROLLERS[kind]
-    if missing := [gain for gain in wanted if gain not in gains]:
-        example = ",".join(f"{gain}=…" for gain in wanted)
-        raise ArgumentTypeError(f"{kind} lacks {', '.join(missing)}: {kind}:{example}")
-    if unknown := sorted(set(gains) - {*wanted, "limit"}):
-        raise ArgumentTypeError(f"{kind} has no {', '.join(unknown)}; it has {', '.join(wanted)}")
-    return kind, gains
-
-
-def output(text: str) -> str:
-    """A path to write to, its folder there: said before the work instead of after it."""
-    if not text:
-        raise ArgumentTypeError("the name of the file is empty")
-    if text == "-":
-        return text
-    try:
-        target = replaced(text)
-    except ValueError as error:
-        raise ArgumentTypeError(str(error).rstrip(".")) from None
-    if target is not None and not target.parent.is_dir():
-        raise ArgumentTypeError(f"{text}: there is no folder {Path(text).parent}; make it first")
-    return text
-
-
-def table(text: str) -> str:
-    """A path to write a table to, of a kind that can be written."""
-    if output(text) == "-" or replaced(text) is None or Path(text).suffix.lower() in TABLES:
-        return text
-    kinds = ", ".join(TABLES)
-    raise ArgumentTypeError(f"{text}: tables are written as {kinds}; use that suffix")
-
-
-def picture(text: str) -> str:
-    """A path to draw to, of a kind that can be drawn."""
-    if Path(text).suffix.lstrip(".").lower() not in PICTURES:
-        kinds = ", ".join(f".{kind}" for kind in PICTURES)
-        raise ArgumentTypeError(f"{text}: pictures are written as {kinds}; use that suffix")
-    return output(text)
-
-
-def count(text: str) -> int:
-    """A whole number from one."""
-    try:
-        value = int(text)
-    except ValueError:
-        value = 0
-    if value < 1:
-        raise ArgumentTypeError(f"{text!r} is not a whole number from 1")
-    return value
-
-
-def seconds(text: str) -> float:
-    """A time span over zero, s."""
-    return _over_zero(text, "a number of seconds over zero")
-
-
-def positive(text: str) -> float:
-    """A number over zero."""
-    return _over_zero(text, "a number over zero")
-
-
-def _over_zero(text: str, wanted: str) -> float:
-    value = number(text)
-    if value <= 0:
-        raise ArgumentTypeError(f"{text!r} is not {wanted}")
-    return value
-
-
-def rate(text: str) -> float:
-    """Samples per second, over zero."""
-    value = number(text)
-    if value <= 0:
-        raise ArgumentTypeError(f"{text!r} is not a number of samples per second over zero")
-    return value
-
-
-def process(text: str) -> tuple[int, int, str]:
-    """`i/n@host:port` as the number of a process, how many there are, and the address of the
-    first.
-    """
-    place, _, address = text.partition("@")
-    index, _, total = place.partition("/")
-    host, _, port = address.rpartition(":")
-    numbers = all(part.isdecimal() for part in (index, total, port))
-    if not (numbers and host and int(index) < int(total)):
-        raise ArgumentTypeError(f"{text!r} is not of the form I/N@HOST:PORT with I from 0 to N-1")
-    return int(index), int(total), address
-
-
-def sizes(text: str) -> tuple[float, float]:
-    """`low:high`, or one number for both; shares from over 0 to 1."""
-    low, _, high = text.partition(":")
-    limits = number(low), number(high or low)
-    if not 0 < limits[0] <= limits[1] <= 1:
-        raise ArgumentTypeError(f"{text!r} is not LOW:HIGH with 0 < LOW ≤ HIGH ≤ 1")
-    return limits
 
 
 def reading(command: ArgumentParser) -> None:

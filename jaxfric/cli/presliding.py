@@ -7,6 +7,7 @@ from typing import Any
 from ..data.provenance import versions
 from ..data.recording import Recording, uniform
 from ..data.summary import facts
+from ..data.targets import standard
 from ..identification import documents, tabulate
 from ..identification.identified import Identified
 from ..identification.identifying import identify
@@ -17,7 +18,7 @@ from ..simulation.prediction import force_error
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.presliding import AbstractBristle
 from .commands import _load, put, read, working
-from .options import say, standard
+from .messages import say
 
 SCHEMA = "jaxfric.presliding/1"
 

@@ -7,7 +7,7 @@ from ..data.io import write_text
 from ..validation import proof
 from . import _configure
 from .commands import working
-from .options import say
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:

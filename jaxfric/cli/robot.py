@@ -14,6 +14,7 @@ from ..data.joints import columns_of, references_of
 from ..data.provenance import sha256
 from ..data.recording import Recording
 from ..data.tables import load
+from ..data.targets import standard
 from ..explanation import Explanation, explain
 from ..explanation.sanity import Check, Looked, Part, look
 from ..export.patch import Again, Patch, patch
@@ -24,7 +25,7 @@ from ..simulators.loading import is_hinge, joints_of, library, read as read_mode
 from ..simulators.patching import folder_of, patched
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .commands import put, read, today, working
-from .options import message, say, standard
+from .messages import message, say
 
 SCHEMA = "jaxfric.robot/1"
 # What the log of one joint gives no role to.

@@ -12,7 +12,7 @@ import numpy as np
 from ..data.io import write_text
 from ..online import Change, Follower, c_source, feed
 from ..units import spell
-from .options import say
+from .messages import say
 
 
 def run(arguments: Namespace) -> int:
