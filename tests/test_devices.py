@@ -116,9 +116,11 @@ def test_a_velocity_is_smoothed_with_the_width_that_suits_its_row():
     place = np.cos(2 * np.pi * time)
     noise = 0.02 * np.random.default_rng(0).normal(size=time.size)
     pair = [jf.Recording(time, place, position=place + x) for x in (0.0, noise)]
-    from jaxfric.identification.question import ask
+    from jaxfric.identification.setup import set_up
 
-    both = ask("coulomb-viscous", jf.stack(pair), jf.ClosedWindows(), width=16).recording.velocity
+    both = set_up(
+        "coulomb-viscous", jf.stack(pair), jf.ClosedWindows(), width=16
+    ).recording.velocity
     for row, single in zip(both, pair, strict=True):
         expected = jf.signals.prepare(single).velocity
         np.testing.assert_allclose(row, expected, rtol=0, atol=1e-9)

@@ -134,11 +134,11 @@ def test_an_interrupted_run_goes_on_without_losing_or_repeating_rows(logs, tmp_p
     out, solved = tmp_path / "fits.csv", []
     real = batches.devices.solve
 
-    def solve(question, faults, over):
+    def solve(setup, faults, over):
         if len(solved) == 2:
             raise Died
-        solved.append(question.recording.time.shape)
-        return real(question, faults, over)
+        solved.append(setup.recording.time.shape)
+        return real(setup, faults, over)
 
     monkeypatch.setattr(batches.devices, "solve", solve)
     with pytest.raises(Died):

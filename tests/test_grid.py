@@ -129,7 +129,7 @@ def test_the_models_of_one_bump_keep_their_own_way():
         assert blocks.staged(models.gaussian() + added)
 
 
-# ---- what the grid is asked ----
+# ---- the resolution of the grid ----
 
 
 def motion(rate=500.0, duration=12.0, slow=1.0):

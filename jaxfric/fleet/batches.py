@@ -11,7 +11,7 @@ from ..identification import devices, documents
 from ..identification.identified import Identified
 from ..identification.identifying import LEAST_COVERED
 from ..identification.projections import AbstractProjection, ClosedWindows, WeakForm
-from ..identification.question import ask
+from ..identification.setup import set_up
 from .journal import Row
 from .reading import Item
 
@@ -75,9 +75,9 @@ class Batches:
         if key[0] == "weak_form":
             projection = WeakForm(width)
         try:
-            question = ask(self._model, batch, projection, self._bounds, width=width)
+            setup = set_up(self._model, batch, projection, self._bounds, width=width)
             faults = np.stack([item.faults for item in filled])
-            found = devices.solve(question, faults, self._over)
+            found = devices.solve(setup, faults, self._over)
         except ValueError as error:  # too short for the kernel
             yield from ((item, failed(item, f"{item.file.path}: {error}")) for item in items)
             return

@@ -118,7 +118,7 @@ def starts(model: Model, static: Float[Array, " P"], limits) -> list[Float[Array
 def refined(model: Model, first: Float[Array, " Q"], rows: Rows, free: Bool[Array, " 2"]):
     """All parameters by Levenberg and Marquardt, and the cost; log σ₀, σ₁, then the static ones.
 
-    `free`: whether stiffness and damping are sought too, or stay.
+    `free`: whether stiffness and damping are searched too, or stay.
     """
     scale = _scale(model, first)
     held = jnp.concatenate([~free, jnp.zeros(first.size - 2, bool)])
@@ -138,7 +138,7 @@ def refined(model: Model, first: Float[Array, " Q"], rows: Rows, free: Bool[Arra
 
 
 def _positive(model: Model) -> np.ndarray:
-    """Which of all parameters are sought by their logarithm: the nonlinear ones that are ratios."""
+    """Which parameters are searched by their logarithm: the nonlinear ones that are ratios."""
     ratios = [p.logarithmic for p in model.term.nonlinear]
     return np.array([False, False, *[False] * model.alpha.size, *ratios])
 
@@ -148,13 +148,13 @@ def _bound(model: Model, values: Float[Array, " Q"]) -> Float[Array, " Q"]:
     return jnp.where(ratio, jnp.log(jnp.where(ratio, jnp.abs(values), 1.0)), values)
 
 
-def _free(model: Model, sought: Float[Array, " Q"]) -> Float[Array, " Q"]:
+def _free(model: Model, searched: Float[Array, " Q"]) -> Float[Array, " Q"]:
     ratio = _positive(model)
-    return jnp.where(ratio, jnp.exp(jnp.where(ratio, sought, 0.0)), sought)
+    return jnp.where(ratio, jnp.exp(jnp.where(ratio, searched, 0.0)), searched)
 
 
 def _scale(model: Model, first: Float[Array, " Q"]) -> Float[Array, " Q"]:
-    """Sizes of the parameters that are sought; of the damping what half a sample of z has."""
+    """Sizes of the parameters that are searched; of the damping what half a sample of z has."""
     size = jnp.where(_positive(model), 1.0, jnp.maximum(jnp.abs(first), 1e-3 * jnp.max(first[2:])))
     return size.at[0].set(1.0).at[1].set(1e-3 * jnp.exp(first[0]))
 

@@ -21,7 +21,7 @@ from ..terms.base import AbstractTerm
 from . import identifying as identification
 from .identified import Identified, raise_unless_successful
 from .projections import AbstractProjection
-from .question import Question, ask
+from .setup import Setup, set_up
 
 AXIS = "rows"
 
@@ -57,42 +57,40 @@ def identify(
             "devices.identify() spreads a batch; of one recording make one by "
             "jaxfric.stack([recording]), or use jaxfric.identify()."
         )
-    question = ask(model, recordings, projection, bounds, grid)
-    found = solve(question, identification.faults(recordings), over)
+    setup = set_up(model, recordings, projection, bounds, grid)
+    found = solve(setup, identification.faults(recordings), over)
     if throw:
         raise_unless_successful(found)
     return found
 
 
-def solve(question: Question, faults: np.ndarray, over: Mesh | None = None) -> Identified:
-    """The answer to a question about a batch, each device at its own rows; arrays of numpy.
+def solve(setup: Setup, faults: np.ndarray, over: Mesh | None = None) -> Identified:
+    """The identification of a batch, each device at its own rows; arrays of numpy.
 
     `faults` of the recordings, `(B, W)`, as [`faults`][] finds them.
     """
     over = mesh() if over is None else over
-    count = question.recording.time.shape[0]
+    count = setup.recording.time.shape[0]
     own = sum(device.process_index == jax.process_index() for device in over.devices.flat)
     if over.size == 1:
-        found, design = identification.solve_rows(*question)
+        found, design = identification.solve_rows(*setup)
     else:
         # Each device has as many rows; what is missing is filled up with the last one.
         full = -(-count // own) * own
-        batch = jax.tree.map(lambda x: _spread(x, full, over), question.recording)
-        spread = _solve(question._replace(recording=batch), over)
+        batch = jax.tree.map(lambda x: _spread(x, full, over), setup.recording)
+        spread = _solve(setup._replace(recording=batch), over)
         found, design = jax.tree.map(lambda x: _gather(x)[:count], spread)
-    return jax.tree.map(
-        np.asarray, identification.checked(found, design, question.recording, faults)
-    )
+    return jax.tree.map(np.asarray, identification.checked(found, design, setup.recording, faults))
 
 
 @eqx.filter_jit
-def _solve(question: Question, over: Mesh) -> tuple[Identified, Design]:
+def _solve(setup: Setup, over: Mesh) -> tuple[Identified, Design]:
     def share(recording):
-        return identification.solve_rows(*question._replace(recording=recording))
+        return identification.solve_rows(*setup._replace(recording=recording))
 
     rows = PartitionSpec(AXIS)
     return jax.shard_map(share, mesh=over, in_specs=rows, out_specs=rows, check_vma=False)(
-        question.recording
+        setup.recording
     )
 
 

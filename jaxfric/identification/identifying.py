@@ -22,8 +22,8 @@ from . import reduced, uncertainty, weighing
 from .checking import checked, faults
 from .identified import LEAST_EXPLAINED, Identified, Result, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
-from .question import ask
 from .search import Found, search
+from .setup import set_up
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
@@ -64,14 +64,14 @@ def identify(
     traced, batch = signals.is_traced(recording), recording.time.ndim == 2
     given = recording.num_samples
     recording = recording if traced or batch else excerpt(recording)
-    question = ask(
+    setup = set_up(
         model, recording if traced or batch else _plain(recording), projection, bounds, grid
     )
     solve = solve_rows if batch else _identify
-    found, design = solve(*question)
-    weak = WeakForm(question.width)
-    if projection is None and question.projection != weak and _too_open(found):
-        found, design = solve(*question._replace(projection=weak))
+    found, design = solve(*setup)
+    weak = WeakForm(setup.width)
+    if projection is None and setup.projection != weak and _too_open(found):
+        found, design = solve(*setup._replace(projection=weak))
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((found, recording))):
         found = checked(found, design, recording, faults(recording, given))
@@ -98,7 +98,7 @@ def _too_open(found: Identified) -> bool:
 
 
 def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identified, Design]:
-    """What a [`Question`][] about a batch asks, row by row."""
+    """What a [`Setup`][] of a batch describes, row by row."""
 
     def one(row):
         return _identify(term, row, projection, width, given, grid)
@@ -113,8 +113,8 @@ def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identi
 solve_rows = programs.compiled(_solve_rows)
 
 
-class _Sought(NamedTuple):
-    """What the nonlinear parameters were sought in, and what was found; the velocity's noise."""
+class _Searched(NamedTuple):
+    """What the nonlinear parameters were searched in, and what was found; the velocity's noise."""
 
     limits: Scales
     noise: Float[Array, ""]
@@ -123,7 +123,7 @@ class _Sought(NamedTuple):
 
 
 @programs.compiled
-def _seek(magnitudes, term, recording, projection, width, given, grid) -> _Sought:
+def _search_rows(magnitudes, term, recording, projection, width, given, grid) -> _Searched:
     """The nonlinear parameters."""
     recording = _sanitised(recording)
     limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
@@ -134,15 +134,15 @@ def _seek(magnitudes, term, recording, projection, width, given, grid) -> _Sough
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    return _Sought(limits, noise, rows, search(active, recording, rows, box, grid, alike))
+    return _Searched(limits, noise, rows, search(active, recording, rows, box, grid, alike))
 
 
 @programs.compiled
-def _judge(
-    sought: _Sought, term, recording, projection, width, given, grid
+def _assess(
+    searched: _Searched, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
     """All parameters and what is known about them, from the nonlinear ones."""
-    limits, noise, rows, best = sought
+    limits, noise, rows, best = searched
     beta, converged, border, alpha = best[:4]
     finite = _finite(recording)
     recording = _sanitised(recording)
@@ -151,7 +151,7 @@ def _judge(
     alpha, jacobian, error = _solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * error**2)
-    alpha, spread, design, pull = _judged(
+    alpha, spread, design, pull = _solved(
         active.with_beta(beta), alpha, jacobian, error, term, recording, limits, rows, weak
     )
     matrix = spread.covariance
@@ -255,16 +255,16 @@ def _outside(rival, beta, matrix) -> Bool[Array, ""]:
     return jnp.any(jnp.abs(rival - beta) > bound * errors)
 
 
-def _identify(*question) -> tuple[Identified, Design]:
-    """What a [`Question`][] about one recording asks, in two programs.
+def _identify(*setup) -> tuple[Identified, Design]:
+    """What a [`Setup`][] of one recording describes, in two programs.
 
     What is found once in a recording is found on the host, where it needs no compiling.
     """
-    recording = question[1]
+    recording = setup[1]
     magnitudes = None
-    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(question)):
+    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(setup)):
         magnitudes = signals.host_scales(_sanitised(jax.tree.map(np.asarray, recording), np))
-    return _judge(_seek(magnitudes, *question), *question)
+    return _assess(_search_rows(magnitudes, *setup), *setup)
 
 
 def _magnitudes(recording: Recording) -> tuple[Scales, Float[Array, ""]]:
@@ -272,9 +272,9 @@ def _magnitudes(recording: Recording) -> tuple[Scales, Float[Array, ""]]:
     return limits, signals.velocity_noise(recording, limits.interval)
 
 
-class _Judged(NamedTuple):
+class _Solved(NamedTuple):
     """Affine parameters of the whole term, deviations of all parameters, the rows of the weak form
-    that they are judged by, and the bias that open ends would leave.
+    that they are compared on, and the bias that open ends would leave.
     """
 
     alpha: Float[Array, " q"]
@@ -283,9 +283,9 @@ class _Judged(NamedTuple):
     open_ends: Float[Array, " q"]
 
 
-def _judged(
+def _solved(
     known, alpha, jacobian, error, term, recording, limits: Scales, rows: Rows, weak: Rows
-) -> _Judged:
+) -> _Solved:
     """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
     weight = rows.positive + rows.negative
     place = uncertainty.places(weight)
@@ -297,7 +297,7 @@ def _judged(
             left = weak.target - weak.offset(known, recording) - columns @ alpha
         spread = uncertainty.deviations(jacobian, error, weight, place)
         design = _design(columns, left, weak)
-        return _Judged(alpha, spread, design, jnp.zeros_like(alpha))
+        return _Solved(alpha, spread, design, jnp.zeros_like(alpha))
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
     # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
@@ -305,7 +305,7 @@ def _judged(
     slope = signals.local_quadratic(recording, recording.velocity, span, 8)[1]
     spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
-    return _Judged(
+    return _Solved(
         jnp.insert(alpha, index[0], weighed.mass),
         weighed.beside(spread, index[0]),
         _design(_inserted(weighed.columns, index[0]), weighed.left, weak),

@@ -161,7 +161,7 @@ def _fitted(found: Any, rows: Rows, level: float) -> Presliding:
 
 
 def _firsts(model: Model, start: Float[Array, " P"], rows: Rows, grid: Float[Array, " G"]):
-    """For each kind its name, log σ₀ and σ₁ to begin with, and which of the two are sought."""
+    """For each kind its name, log σ₀ and σ₁ to begin with, and which of the two are searched."""
     costs, dampings, dahl = map(np.asarray, scan(model, start, rows, grid))
     place, other = int(np.nanargmin(costs)), int(np.nanargmin(dahl))
     yield "lugre", jnp.asarray([grid[place], dampings[place]]), jnp.asarray([True, True])

@@ -28,7 +28,7 @@ class Rows(eqx.Module):
 
     - `target`: the projected force, N, shape `(J,)`.
     - `positive`, `negative`: weights of the rows in each direction of slip, s, `(J,)`.
-    - `moving`: weights of the rows on which a model is judged: reversals too, rest not, `(J,)`.
+    - `moving`: weights of the rows over which errors are taken: reversals too, rest not, `(J,)`.
     - `time`: s, `(J,)`.
     - `windows`: how many windows (or, in the weak form, slip stretches) were used.
     - `covered`: share of the valid slip time that the rows use.

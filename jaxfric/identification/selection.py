@@ -71,7 +71,7 @@ def select(
 ) -> Selection:
     """The simplest friction model that predicts held-out force as well as the best one does.
 
-    Every candidate is fitted to the rows of the weak form without those of one fold, and judged
+    Every candidate is fitted to the rows of the weak form without those of one fold, and validated
     on these. Among the candidates whose mean error does not exceed the least one significantly
     (5 %, one-sided t test of the folds' ratios), the one with the fewest parameters is chosen. One
     standard error (Breiman et al. 1984) would prefer a needless parameter in 19 % of ties, as five
@@ -188,7 +188,7 @@ def _standing(name, term, recording, width, fold, folds) -> Candidate:
     training = eqx.tree_at(lambda r: r.mask, batch, batch.mask & ~left_out)
     found = identify(term, training, projection=WeakForm(width))
     testing = eqx.tree_at(lambda r: r.mask, batch, batch.mask & left_out)
-    square, size = _judge(found.model, testing, width)
+    square, size = _held_out_power(found.model, testing, width)
     held_out = np.asarray(square)
     relative = float(np.sqrt(np.mean(held_out) / np.mean(np.asarray(size))))
     count = len(term.affine) + len(term.nonlinear)
@@ -196,7 +196,7 @@ def _standing(name, term, recording, width, fold, folds) -> Candidate:
 
 
 @eqx.filter_jit
-def _judge(models: Model, recordings: Recording, width: int):
+def _held_out_power(models: Model, recordings: Recording, width: int):
     """Mean-square residual and force of each fold's rows in slip, N²."""
 
     def one(pair):

@@ -1,4 +1,4 @@
-"""What an identification is asked: the arguments checked, the recording prepared."""
+"""The setup of an identification: the arguments checked, the recording prepared."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from .identified import Identified
 from .projections import AbstractProjection, ClosedWindows, WeakForm
 
 
-class Question(NamedTuple):
+class Setup(NamedTuple):
     """All that an identification depends on: the term, a prepared recording or batch, the
     projection, the half-width of the weak form's kernel (of the mass and of the force error too),
     the bounds by name and the points of the grid, or a plan of several.
@@ -30,14 +30,14 @@ class Question(NamedTuple):
     grid: grids.Plan | int | None
 
 
-def ask(
+def set_up(
     model: AbstractTerm | Model | Identified | str,
     recording: Recording,
     projection: AbstractProjection | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     grid: int | None = None,
     width: int | None = None,
-) -> Question:
+) -> Setup:
     """What [`identify`][] solves for its arguments; `width`, where it is known already.
 
     **Raises:** `ValueError` if the model cannot be identified from such a recording.
@@ -51,7 +51,7 @@ def ask(
     limits = tuple(sorted((name, tuple(map(float, pair))) for name, pair in (bounds or {}).items()))
     chosen = projection or (WeakForm(width) if _beyond_velocity(term) else ClosedWindows())
     plan = _plan(term, prepared, chosen, dict(limits)) if grid is None else grid
-    return Question(term, prepared, chosen, width, limits, plan)
+    return Setup(term, prepared, chosen, width, limits, plan)
 
 
 def _plan(term, recording, projection, given) -> grids.Plan | None:
