@@ -16,8 +16,8 @@ from ...data.recording import Recording
 from ...simulators import Mujoco
 from ..acceptance import LINEARITY
 from ..baseline import _fewest as fewest
+from ..least_squares import orthonormal
 from ..predictions import rate
-from ..regression import orthonormal
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
 ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
