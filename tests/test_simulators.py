@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxfric import cli, explain, models, predict, simulators, terms
-from jaxfric.explanation.baseline import _fewest
+from jaxfric.explanation.mismatch import fewest
 from jaxfric.simulators import Known, Mujoco
 from jaxfric.terms import KNOWN_FORCE
 from tests.test_explain import CASES, PARAMETERS, healthy, planted
@@ -114,11 +114,11 @@ def test_the_fewest_columns_are_enough():
     columns = np.stack([q, np.sin(q), np.cos(q), np.ones_like(q), np.sign(np.sin(40 * q))], axis=1)
     block = np.arange(600) // 25
     noise = 0.003 * draw.normal(size=600)
-    assert _fewest(columns, 1.5 * q + noise, block, 0.0) == [0]
-    assert _fewest(columns, np.sin(q) + noise, block, 0.0) == [1]
+    assert fewest(columns, 1.5 * q + noise, block, 0.0) == [0]
+    assert fewest(columns, np.sin(q) + noise, block, 0.0) == [1]
     both = -0.4 * columns[:, 2] + 0.3 * columns[:, 4]
-    assert sorted(_fewest(columns, both + noise, block, 0.0)) == [2, 4]
-    assert _fewest(columns, noise, block, 0.0) == []
+    assert sorted(fewest(columns, both + noise, block, 0.0)) == [2, 4]
+    assert fewest(columns, noise, block, 0.0) == []
 
 
 def test_another_machine_has_all_its_values_moved():
@@ -127,7 +127,7 @@ def test_another_machine_has_all_its_values_moved():
     difference = columns[:, :7] @ np.ones(7) + 0.01 * draw.normal(size=600)
     block = np.arange(600) // 25
     enough = 1e-3 * float(difference @ difference)
-    assert _fewest(columns, difference, block, enough) == list(range(8))
+    assert fewest(columns, difference, block, enough) == list(range(8))
 
 
 # ---- the command ----

@@ -1,8 +1,5 @@
 """What a recording is compared with: a model's name, a model, or another simulator's output."""
 
-import itertools
-import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -12,13 +9,10 @@ from ..identification.identified import Identified
 from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
-from . import parameters as spelled
-from .acceptance import LEAST_SHARE, LINEARITY
 from .evidence import Evidence
-from .least_squares import RANK, orthonormal, solve
+from .least_squares import solve
 from .predictions import with_predictions
 from .regression import Fit, fit
-from .significance import LEVEL, BlockBootstrap, blocks
 
 
 class Baseline(NamedTuple):
@@ -36,23 +30,6 @@ class Baseline(NamedTuple):
     fit: Fit | None = None
     structured: frozenset[str] = frozenset()
     rough: bool = False
-
-
-class Mismatch(NamedTuple):
-    """Parameters whose values are wrong, and what that costs.
-
-    `moved`: number of each parameter among affine and nonlinear ones, with its value before;
-    `share`: part of the mean-square residual before that the right values remove; `p_value`;
-    `energy`: of the residual before, N²; `within`: numbers of those that move with the others, by
-    no more than is uncertain; `instead`: to each that moved, what would do as well.
-    """
-
-    moved: dict[int, float]
-    share: float
-    p_value: float
-    energy: float
-    within: frozenset[int] = frozenset()
-    instead: dict[int, tuple[int, ...]] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
 
 
 def baseline_of(given) -> Baseline:
@@ -135,177 +112,3 @@ def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ..
             energy=float(residual @ residual),
         )
     return current
-
-
-# More wrong values than this are another machine.
-MOST_WRONG = 5
-# The normal quantile of 1 % shared among twenty parameters.
-SURE = 3.5
-
-
-def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:
-    """Which of a model's values are wrong on a recording; `None` if none is.
-
-    `refitted`: with all values free, beside the terms found: values and missing physics are judged
-    together. The refitted parameters differ from the given ones (all of them together at 1 %) and
-    take enough of the residual. Of those the fewest are moved that leave no more than all of them
-    do, but for what no sensor of force resolves.
-    """
-    given = as_given(model, refitted, evidence)
-    share = 1 - refitted.energy / given.energy if given.energy > 0 else 0.0
-    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    count, counts = len(given.alphas[0]), len(given.betas[0])
-    affine, slopes = refitted.columns, refitted.slopes
-    own = np.concatenate([affine[:, :count], slopes[:, :counts]], axis=1)
-    beside = orthonormal(np.concatenate([affine[:, count:], slopes[:, counts:]], axis=1))
-    own = own - beside @ (beside.T @ own)
-    raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
-    empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
-    scan = BlockBootstrap(empty, block, seed)(raw.astype(np.float32))
-    p_value = float((1 + np.sum(scan.drawn >= scan.gain[0])) / (1 + len(scan.drawn)))
-    if share < LEAST_SHARE or p_value > LEVEL:
-        return None
-    before = [*given.alphas[0], *given.betas[0]]
-    enough = LINEARITY**2 * float(evidence.force @ evidence.force)
-    free = _fewest(own, given.residual, block, enough)
-    if not free:
-        return None
-    free = _different(model, refitted, evidence, block, free)
-    instead = _instead(own, given.residual, block, free, enough)
-    if vague := [i for i, others in instead.items() if len(others) > VAGUE * own.shape[1]]:
-        free = [i for i in free if i not in vague] or free
-        instead = _instead(own, given.residual, block, free, enough)
-    moved = {i: before[i] for i in sorted(free)}
-    return Mismatch(moved, float(share), p_value, given.energy, instead=instead)
-
-
-# What half of all parameters would do as well says nothing of any of them.
-VAGUE = 0.5
-# Half a 95 % interval in standard errors.
-HALF_WIDTH = 2.0
-
-
-def _different(
-    model: Model, refitted: Fit, evidence: Evidence, block: np.ndarray, free: list[int]
-) -> list[int]:
-    """The wrong values without those that, fitted with the rest, are what they were.
-
-    What a law of the missing physics takes of a value is known once both are fitted together.
-    """
-    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
-    units = dict(model.units)
-    while 1 < len(free) <= MOST_WRONG:
-        current = as_given(model, refitted, evidence, tuple(free))
-        values = spelled.estimates(freed(current, free), block, units)[0]
-        before = [*model.alpha, *model.term.beta()]
-        away = {
-            i: abs(float(values[names[i]].value) - float(before[i]))
-            / float(values[names[i]].standard_error)
-            for i in free
-        }
-        least = min(away, key=lambda i: away[i])
-        if away[least] > HALF_WIDTH:
-            break
-        free = [i for i in free if i != least]
-    return free
-
-
-def freed(current: Fit, free: Iterable[int]) -> Fit:
-    """A fit of whose base only some values were fitted; what stayed has no error."""
-    moved, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
-    count, searched = len(current.alphas[0]), len(current.betas[0])
-    columns[:, [i for i in range(count) if i not in moved]] = 0.0
-    slopes[:, [i for i in range(searched) if count + i not in moved]] = 0.0
-    return current._replace(columns=columns, slopes=slopes)
-
-
-def _fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
-    """Numbers of the fewest columns that leave what all of them leave, N², but for `enough`.
-
-    Of every size the best subset; none of whose columns is within its interval of nothing. Where
-    more than `MOST_WRONG` are needed, it is another machine, and all of them.
-    """
-    size = np.linalg.norm(own, axis=0)
-    used = np.flatnonzero(size > 0)
-    columns = own[:, used] / size[used]
-    gram, pull = columns.T @ columns, columns.T @ residual
-    most = _removed(gram, pull, range(len(used)))
-    found: tuple[int, ...] = ()
-    for count in range(1, min(len(used), MOST_WRONG) + 1):
-        if most - _removed(gram, pull, found) < enough:
-            break
-        better = _best(gram, pull, count, found)
-        if not _sure(columns[:, better], residual, block):
-            break
-        found = better
-    if len(found) == MOST_WRONG and most - _removed(gram, pull, found) >= enough:
-        return used.tolist()
-    return [int(used[i]) for i in found]
-
-
-# Of more subsets than this the best is looked for among those that hold the best of one fewer.
-MOST_SUBSETS = 100_000
-# Beside a diagonal of one; of columns that differ by less the sum is not told from one of them.
-RIDGE = 1e-12
-
-
-def _best(gram: np.ndarray, pull: np.ndarray, count: int, before: tuple[int, ...]):
-    """The subset of that many columns that takes most off the energy."""
-    number = range(len(pull))
-    if math.comb(len(pull), count) <= MOST_SUBSETS:
-        subsets = np.array(list(itertools.combinations(number, count)))
-    else:
-        tried = [[*some, *more] for r in (1, 2) if r <= count
-                for some in itertools.combinations(before, count - r)
-                for more in itertools.combinations(sorted(set(number) - set(some)), r)]  # fmt: skip
-        subsets = np.unique(np.sort(np.array(tried)), axis=0)
-    inner = gram[subsets[:, :, None], subsets[:, None, :]] + RIDGE * np.eye(count)
-    outer = pull[subsets]
-    gains = np.einsum("sk,sk->s", outer, np.linalg.solve(inner, outer[..., None])[..., 0])
-    return tuple(int(i) for i in subsets[int(np.argmax(gains))])
-
-
-def _instead(
-    own: np.ndarray, residual: np.ndarray, block: np.ndarray, free: list[int], enough: float
-) -> dict[int, tuple[int, ...]]:
-    """Columns that would do as well instead of one of those that are free."""
-    found: dict[int, tuple[int, ...]] = {}
-    size = np.linalg.norm(own, axis=0)
-    others = [j for j in range(own.shape[1]) if j not in free and size[j] > 0]
-    noise = residual - own[:, free] @ solve(own[:, free], residual)
-    if len(free) > MOST_WRONG:
-        return found
-    for i in free:
-        rest = orthonormal(own[:, [j for j in free if j != i]])
-        alike = []
-        for j in others:
-            basis = orthonormal(own[:, [j]], rest)
-            basis = np.concatenate([rest, basis], axis=1)
-            lone = own[:, i] - basis @ (basis.T @ own[:, i])
-            lone = lone / max(float(np.linalg.norm(lone)), 1e-300)
-            part = float(lone @ residual)
-            spread = np.bincount(block, lone * noise, int(block[-1]) + 1)
-            if abs(part) <= SURE * float(np.linalg.norm(spread)) or part**2 < enough:
-                alike.append(j)
-        if alike:
-            found[i] = tuple(alike)
-    return found
-
-
-def _removed(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
-    """By how much some of the columns lower the energy of the residual."""
-    index = list(some)
-    if not index:
-        return 0.0
-    solved = np.linalg.lstsq(gram[np.ix_(index, index)], pull[index], rcond=RANK**2)[0]
-    return float(solved @ pull[index])
-
-
-def _sure(columns: np.ndarray, residual: np.ndarray, block: np.ndarray) -> bool:
-    """Whether each column's part is beyond noise like what all of them leave, by blocks."""
-    inverse = np.linalg.pinv(columns, rcond=RANK)
-    parts = inverse @ residual
-    noise = residual - columns @ parts
-    count = int(block[-1]) + 1
-    sums = np.stack([np.bincount(block, row * noise, count) for row in inverse])
-    return bool(np.all(np.abs(parts) > SURE * np.sqrt(np.sum(sums**2, axis=1))))

@@ -11,10 +11,11 @@ import numpy as np
 from ..data.recording import Recording
 from . import parameters as spelled, verification
 from .acceptance import LEAST_SHARE
-from .baseline import SURE, Baseline, Mismatch
+from .baseline import Baseline
 from .evidence import Evidence
 from .findings import Solution
 from .locate import locate
+from .mismatch import SURE, Mismatch
 from .predictions import PREDICTED, with_predictions
 from .regression import Fit, fit
 from .structure import significant

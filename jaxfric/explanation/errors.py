@@ -8,11 +8,12 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from . import parameters as spelled, verification
-from .baseline import SURE, at_values
+from .baseline import at_values
 from .evidence import gather
 from .figures import Figures, cast
 from .findings import Findings, Solution
 from .improvement import Improved
+from .mismatch import SURE
 from .motion import motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit

@@ -15,7 +15,7 @@ from ..simulators import AbstractSimulator
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, sanity, threads
 from .attributes import in_own_words
-from .baseline import Baseline, Mismatch, at_values, baseline_of, mismatch
+from .baseline import Baseline, at_values, baseline_of
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
 from .evidence import shortened
@@ -25,6 +25,7 @@ from .forward import motion_error
 from .holdout import check_signals, confirmed
 from .improvement import Improved, improved
 from .inputs import Inputs, as_seen, prepare
+from .mismatch import Mismatch, mismatch
 from .motion import motion_of
 from .problem import Problem, problem_of, with_holdout
 from .search import at_given, nothing, obeying, searched

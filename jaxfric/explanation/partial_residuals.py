@@ -11,12 +11,12 @@ import numpy as np
 
 from ..terms.effects import EFFECTS
 from . import verification
-from .baseline import Mismatch
 from .bins import Axis, Bins, axis
 from .evidence import Evidence
 from .improvement import Improved
 from .intervals import covariance
 from .locate import coordinates
+from .mismatch import Mismatch
 from .predictions import with_predictions
 from .regression import Fit
 

@@ -6,11 +6,12 @@ from ..identification.uncertainty import Estimate
 from ..terms.effect import Extent
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import verification
-from .baseline import Baseline, Mismatch
+from .baseline import Baseline
 from .evidence import Evidence
 from .explained import Finding, Moved
 from .findings import Findings
 from .improvement import Improved
+from .mismatch import Mismatch
 from .regression import Fit
 from .sentences import changed_sentence, mismatch_sentence, sentence
 from .uncertainty import estimated

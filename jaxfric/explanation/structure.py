@@ -7,12 +7,12 @@ import numpy as np
 
 from ..terms.effects import EFFECTS
 from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY
-from .baseline import Mismatch
 from .bins import unit
 from .evidence import Evidence
 from .explained import Finding
 from .improvement import Improved
 from .locate import NOISY, Structure, locate, repeated
+from .mismatch import Mismatch
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit

@@ -10,13 +10,14 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, structure, verification
-from .baseline import Baseline, Mismatch, freed
+from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, doubts, not_better
 from .errors import document, filtered_errors
 from .explained import ELSEWHERE, Explanation, Finding
 from .figures import Figures
 from .improvement import Improved, holdout_model
+from .mismatch import Mismatch, freed
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection

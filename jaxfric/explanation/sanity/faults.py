@@ -15,8 +15,8 @@ import numpy as np
 from ...data.recording import Recording
 from ...simulators import Mujoco
 from ..acceptance import LINEARITY
-from ..baseline import _fewest as fewest
 from ..least_squares import orthonormal
+from ..mismatch import fewest
 from ..predictions import rate
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
