@@ -179,6 +179,7 @@ def summary(cases):
     return {f"noise {noise:.0%}": {
         kind: _counts([case[kind][i] for case in cases if i < len(case[kind])])
         for kind in KINDS
+        if any(i < len(case[kind]) for case in cases)
     } for i, noise in enumerate(NOISES)}  # fmt: skip
 
 
