@@ -256,3 +256,9 @@ def test_a_damaged_bag_is_refused(tmp_path):
     (tmp_path / "log.mcap").write_bytes(b"\x89MCAP0\r\n")
     with pytest.raises(ValueError, match="no readable bag"):
         load(tmp_path / "log.mcap")
+
+
+def test_a_role_may_have_any_of_its_names():
+    given = {"shoulder_pan_effort": "current", "shoulder_pan_pos": "position"}
+    found = columns_of(["time", "position", "current"], ["shoulder_pan"], given, "log.csv")
+    assert found == {"shoulder_pan": {"position": "position", "force": "current"}}

@@ -31,7 +31,7 @@ def columns_of(
     **Raises:** `ValueError` if two columns stand for one role of one joint, or a column that is
     given is not there.
     """
-    names = list(columns)
+    names, given = list(columns), _spelt(given, joints)
     found: dict[str, dict[str, list[str]]] = {joint: {} for joint in joints}
     numbered = _numbered(names)
     for name in names:
@@ -62,6 +62,7 @@ def references_of(
 ) -> dict[str, str]:
     """The column of each joint's reference, where there is one and no more."""
     names, found = list(columns), dict[str, list[str]]()
+    given = _spelt(given, joints)
     for name in names:
         for joint, role in _named(name, joints):
             if role == "reference":
@@ -72,6 +73,15 @@ def references_of(
         if (own := given.get(f"{joint}_reference")) in names:
             found[joint] = [own]
     return {joint: some[0] for joint, some in found.items() if len(some) == 1}
+
+
+def _spelt(given: Mapping[str, str], joints: Sequence[str]) -> dict[str, str]:
+    """What the user says, its roles by their names: `elbow_effort` is `elbow_force`."""
+    found = {}
+    for key, column in given.items():
+        meant = [] if key in joints else _named(key, joints)
+        found["_".join(meant[0]) if len(meant) == 1 else key] = column
+    return found
 
 
 def _named(name: str, joints: Sequence[str]) -> list[tuple[str, str]]:
