@@ -10,7 +10,7 @@ import pytest
 from jaxfric import terms
 from jaxfric.cli import main
 from jaxfric.explanation import Earlier, explain
-from jaxfric.explanation.explained import Moved
+from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.sentences import changed_sentence, parameter
 
 from .test_cli import write_axis

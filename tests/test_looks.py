@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, strategies
 
 import jaxfric as jf
-from jaxfric.explanation.explained import Finding
+from jaxfric.explanation.finding import Finding
 from jaxfric.identification.documents import to_json
 from jaxfric.identification.identified import result_names
 from jaxfric.looks import drawing, html, text

@@ -12,9 +12,9 @@ from jaxfric import models, predict, read, terms
 from jaxfric.cli import main
 from jaxfric.data import io
 from jaxfric.explanation import doubts, explain, improvement, least_squares, regression
-from jaxfric.explanation.explained import DOUBTED
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
+from jaxfric.explanation.wording import DOUBTED
 from jaxfric.simulation.prediction import delay_of, force_error, in_motion, outliers
 
 from .test_explain import CASES, TIME, healthy, planted

@@ -8,7 +8,8 @@ import numpy as np
 from ..identification.uncertainty import Estimate
 from ..simulators import Attribute
 from ..terms.effects.parameter_mismatch import MISMATCH
-from .explained import Explanation, Finding, Moved
+from .explained import Explanation
+from .finding import Finding, Moved
 from .sentences import quantity
 
 # Corrections that are no attribute by themselves.

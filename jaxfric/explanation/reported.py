@@ -8,7 +8,7 @@ from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import verification
 from .baseline import Baseline
 from .evidence import Evidence
-from .explained import Finding, Moved
+from .finding import Finding, Moved
 from .findings import Findings
 from .improvement import Improved
 from .mismatch import Mismatch

@@ -9,7 +9,7 @@ from ..terms.effects import EFFECTS
 from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY
 from .bins import unit
 from .evidence import Evidence
-from .explained import Finding
+from .finding import Finding
 from .improvement import Improved
 from .locate import NOISY, Structure, locate, repeated
 from .mismatch import Mismatch

@@ -14,8 +14,9 @@ from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, doubts, not_better
 from .errors import document, filtered_errors
-from .explained import ELSEWHERE, Explanation, Finding
+from .explained import Explanation
 from .figures import Figures
+from .finding import Finding
 from .improvement import Improved, holdout_model
 from .mismatch import Mismatch, freed
 from .partial_residuals import moved as moved_curve, partial_residuals
@@ -23,6 +24,7 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, rough, stand_ins, verdict_of
+from .wording import ELSEWHERE
 
 
 def summarise(

@@ -9,7 +9,8 @@ from ..checks import Remark
 from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY
 from .doubts import NOT_BETTER
-from .explained import LARGE, Finding
+from .finding import Finding
+from .wording import LARGE
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
 # part; of four times its size, sixteen times the power, something is missing, wherever.

@@ -14,8 +14,9 @@ from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.prediction import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
-from ..explained import Explanation, Finding
+from ..explained import Explanation
 from ..figures import Figures, cast
+from ..finding import Finding
 from . import limits, wiring
 from .contact import Contact, contacts
 from .faults import Faults, Seen, find, put_right

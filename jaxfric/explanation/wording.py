@@ -1,0 +1,132 @@
+"""The summary of an explanation in words."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .finding import Finding
+
+VERDICTS = {
+    "consistent": "Nothing is missing: what the model leaves is no more than noise.",
+    "explained": "The named physics accounts for what the model leaves out.",
+    "partly_explained": "Named physics accounts for a part; structure is left, or terms overlap.",
+    "unexplained": "Something is missing that no effect of the library accounts for.",
+}
+
+
+# The same where the baseline is another recording.
+CHANGES = {
+    "consistent": "Nothing differs between the two recordings beyond the noise.",
+    "explained": "What is named accounts for the difference between the two recordings.",
+    "partly_explained": "What is named accounts for a part of the difference between the two "
+    "recordings; more is left.",
+    "unexplained": "The two recordings differ by something that no effect of the library "
+    "accounts for.",
+}
+
+
+# Instead of a verdict's words, where what was measured contradicts itself.
+DOUBTED = "Until that is put right, nothing is named."
+
+
+def summary(
+    verdict: str,
+    baseline: str,
+    findings: Sequence[Finding],
+    not_confirmed: Sequence[Finding],
+    fit: Mapping[str, Any],
+    warnings: Sequence[Mapping[str, Any]],
+) -> str:
+    """The verdict in words: what is certain to be wrong first, then the force errors."""
+    severe = [each["text"] for each in warnings if each["severe"]]
+    other = [each["text"] for each in warnings if each["name"] == "not_better"]
+    words = CHANGES if baseline.startswith("recording") else VERDICTS
+    said = DOUBTED if severe and not findings else words[verdict]
+    refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
+    whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings))]
+    return " ".join([*whole, *_not_determined(fit)])
+
+
+def _not_confirmed(findings: Sequence[Finding]) -> str:
+    names = dict.fromkeys(finding.effect.replace("_", " ") for finding in findings)
+    return (
+        f"What looks like {' and '.join(names)} here is not borne out by the held-out recording, "
+        "and is left out of the model."
+    )
+
+
+def _errors(fit: Mapping[str, Any], found: bool) -> str:
+    """The force errors, and what of them is noise."""
+
+    def said(error: Mapping[str, float]) -> str:
+        after = f" before, {error['after']:.2%} after" if found else ""
+        return f"{error['before']:.2%}{after}"
+
+    text = f"Force error {said(fit['force_error'])}"
+    if held := fit.get("holdout_force_error"):
+        text += f"; on the held-out recording{adjusted(fit)} {said(held)}"
+    if (floor := fit.get("noise_floor")) is not None and math.isfinite(floor):
+        text += f"; {floor:.2%} is what noise alone makes"
+    return f"{text}.{_by_sample(fit)}"
+
+
+# A third of the force, a tenth of its power.
+LARGE = 0.3
+
+
+def _by_sample(fit: Mapping[str, Any]) -> str:
+    """What most of a large error is that no filter leaves: noise, or friction beside standstill."""
+    if "filtered_force_error" not in fit:
+        return ""
+    whole, filtered = fit["force_error"]["after"], fit["filtered_force_error"]["after"]
+    if not whole > LARGE or filtered > 0.5 * whole:
+        return ""
+    if (floor := fit.get("noise_floor")) is not None and floor**2 > 0.5 * whole**2:
+        what = "the noise of the acceleration"
+    else:
+        what = "left beside standstill and reversals, for which the values are no good"
+    return f" Sample by sample most of it is {what}: {filtered:.2%} is left through a filter."
+
+
+def adjusted(fit: Mapping[str, Any]) -> str:
+    """Which findings the held-out figures take otherwise than the saved model has them."""
+    adjusted = fit.get("holdout_adjusted") or {}
+    parts = [
+        f"{' and '.join(name.replace('_', ' ') for name in adjusted[key])} {how}"
+        for key, how in (("rephased", "at another phase"), ("left_out", "left out"))
+        if adjusted.get(key)
+    ]
+    return f" ({', '.join(parts)})" * bool(parts)
+
+
+# Other values of the same model leave less than half of a held-out recording's error, a quarter of
+# its power: then most of it is not physics that the model lacks.
+ELSEWHERE = 2.0
+
+
+def _not_determined(fit: Mapping[str, Any]) -> list[str]:
+    """That other values hold on the held-out recording, or none that this one determines."""
+    refitted = fit.get("filtered_holdout_refitted_error")
+    if refitted is None or fit["filtered_holdout_force_error"]["after"] <= ELSEWHERE * refitted:
+        return []
+    through = f"{fit['filtered_holdout_force_error']['after']:.2%}"
+    text = (
+        f"But through the search's filter {through} of the held-out force is left, and "
+        f"{refitted:.2%} where the model is fitted to it: "
+    )
+    if values := fit.get("holdout_values"):
+        there = ", ".join(_differs(name, **value) for name, value in values.items())
+        return [
+            f"{text}there {there}. Either the machine changed in between, or no model of this kind "
+            "holds for both motions."
+        ]
+    return [
+        f"{text}this recording does not determine the values that hold there. Identify on one that "
+        "moves like both."
+    ]
+
+
+def _differs(name: str, here: float, there: float, standard_error: float, unit: str) -> str:
+    digits = max(0, 1 - math.floor(math.log10(2 * standard_error)))
+    unit = f" {unit}" if unit not in ("", "1") else ""
+    return f"{name} is {there:.{digits}f} instead of {here:.{digits}f}{unit}"
