@@ -1,4 +1,4 @@
-"""What a model leaves out of a recording: located, named, verified."""
+"""What a model leaves out of a recording: located, selected, verified."""
 
 from .earlier import Earlier as Earlier
 from .explained import Explanation as Explanation

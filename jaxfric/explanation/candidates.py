@@ -1,4 +1,4 @@
-"""The terms that compete for a residual, with the places of their nonlinear parameters to try."""
+"""The terms that compete for a residual, with grids of their nonlinear parameters."""
 
 import functools
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ KEPT = 1 << 28
 
 
 class Candidate(NamedTuple):
-    """A term of an effect, and the places of β to try: `betas`, `(G, d)`.
+    """A term of an effect, and its grid of β: `betas`, `(G, d)`.
 
     `lines`: how its waves are computed; `least`: the part of what is left that it must take.
     """
@@ -34,7 +34,7 @@ class Candidate(NamedTuple):
     least: float = 0.0
 
     def columns(self, evidence: Evidence) -> np.ndarray:
-        """The rows of its columns at every place, `(G, J, k)`."""
+        """The rows of its columns at every grid point, `(G, J, k)`."""
         if self.lines is not None:
             return self.lines.columns(evidence, self.betas[:, 0])
         return evidence.columns(self.term, self.betas)
@@ -70,7 +70,7 @@ class CandidateSet:
         return known and all(np.array_equal(*p) for p in [(self._rows, evidence.rows), *pairs])
 
     def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
-        """The columns of one candidate at all its places, `(G, k, J)`, scaled to about one."""
+        """The columns of one candidate on its whole grid, `(G, k, J)`, scaled to about one."""
         known = self._kept.get(self._widest.get(id(candidate), id(candidate)))
         if known is None:
             return _columns(evidence, candidate)
@@ -83,7 +83,7 @@ class CandidateSet:
             columns.cancel()
 
     def forget(self) -> None:
-        """Keep no columns any more: what is asked for is computed."""
+        """Hold no columns any more: they are computed when needed."""
         self.close()
         self._kept = {}
 

@@ -23,7 +23,7 @@ FINALISTS = 8
 
 
 class Trial(NamedTuple):
-    """A candidate with its place on the grid, and how it did there.
+    """A candidate at the best point of its grid, and how it did there.
 
     `gain`: R²; `null_mean`: its mean over the draws; `dimension`: how many of its columns are new;
     `threshold`: the R² from which it is significant; `new_part`: the part of the term's force, in

@@ -54,10 +54,10 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
         "holdout_force_error": None,
         "noise_floor": verification.noise(current, evidence.force),
     }
-    named = spelled.estimates(current, problem.block, recording.unit_names)
+    values = spelled.estimates(current, problem.block, recording.unit_names)
     columns = [
         [known[p.name].standard_error for p in (*term.affine, *term.nonlinear)]
-        for term, known in zip(current.terms, named, strict=True)
+        for term, known in zip(current.terms, values, strict=True)
     ]
     counts = [len(term.affine) for term in current.terms]
     affine = [e for own, count in zip(columns, counts, strict=True) for e in own[:count]]
@@ -74,7 +74,7 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
 
 
 def rephased(known: Baseline, evidence: Evidence) -> Baseline:
-    """The baseline with its waves over position at their phase here, their amplitude kept.
+    """The baseline with its waves over position at their phase here, with the same amplitude.
 
     The zero of an incremental encoder is another after each homing.
     """

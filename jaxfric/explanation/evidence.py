@@ -103,7 +103,7 @@ class Evidence(NamedTuple):
 
 
 def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weighted sums of the nodes around every third one, of which `rows` are kept."""
+    """Weighted sums of the nodes around every third one, at the numbers `rows`."""
     around = np.lib.stride_tricks.sliding_window_view(values, weights.shape[1], axis=-1)
     centred = around[..., ::STRIDE, :][..., : len(weights), :]
     return np.einsum("...ck,ck->...c", centred, weights)[..., rows]
@@ -197,8 +197,8 @@ def shortened(recording: Recording) -> Recording:
     return excerpt(recording, min(most, MOST))
 
 
-# Kernels in a record at least: 24 blocks of eight, on which its significance is judged. Where an
-# axis hardly accelerates, the noise of its acceleration would ask for wider ones.
+# Kernels in a record at least: 24 blocks of eight, for its significance. Where an axis
+# hardly accelerates, the noise of its acceleration would ask for wider ones.
 KERNELS = 192
 
 

@@ -32,7 +32,7 @@ class Finding(NamedTuple):
       same on the held-out recording, `None` without one or where the effect is of the moment.
     - `p_value`: paid for by the number of terms tried.
     - `attribute`: the simulator's own name for it, where there is one; `confirmed`: whether the
-      held-out recording bears it out, `None` where it is not asked; `instead`: to each wrong value
+      held-out recording confirms it, `None` where it is not tested; `instead`: to each wrong value
       by name, others that this motion cannot tell from it.
     """
 

@@ -149,7 +149,8 @@ SPIKES = "force_spikes"
 def inspected(recording: Recording) -> tuple[Recording, list[Remark]]:
     """A recording without samples that no actuator made, and what is to be said of it.
 
-    Every check of a recording by itself belongs here: where a remark is severe, nothing is named.
+    Every check of a recording by itself belongs here: where a remark is severe, nothing is
+    searched.
     """
     remarks = [remark for remark in checks.inspect(recording) if remark.name != SPIKES]
     spikes = outliers(recording)

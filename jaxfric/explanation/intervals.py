@@ -17,9 +17,9 @@ def covariance(current: Fit, block: np.ndarray) -> np.ndarray:
     jacobian = current.jacobian
     size = np.sqrt(np.sum(jacobian**2, axis=0))
     scaled = jacobian / np.where(size > 0, size, 1.0)
-    left, values, right = np.linalg.svd(scaled, full_matrices=False)
+    basis, values, right = np.linalg.svd(scaled, full_matrices=False)
     seen = values > 1e-7 * max(values.max(initial=0.0), 1e-300)
-    white = left[:, seen]
+    white = basis[:, seen]
     back = (right[seen].T / values[seen]) / np.where(size > 0, size, 1.0)[:, None]
     hidden = np.sqrt(np.sum(right[~seen] ** 2, axis=0)) > 1e-3
     starts = np.flatnonzero(np.diff(block, prepend=-1))
@@ -38,7 +38,7 @@ def covariance(current: Fit, block: np.ndarray) -> np.ndarray:
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:
-    """The energy that blocks are left with, N², by a term that was fitted to all the others.
+    """The energy of the residual, N², each block by the term as fitted to all the other blocks.
 
     To first order in the term's own parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks);
     those of the other terms stay as all blocks say. Each block's pull on the fit is bounded as in

@@ -27,7 +27,8 @@ _EARLY = np.concatenate([[0.0], 2.0 ** np.linspace(-8.0, 0.0, KNOTS - 1)])
 class Structure(NamedTuple):
     """What the residual shows against one coordinate.
 
-    - `share`: part of the residual's mean square that the curve removes beyond what chance gives.
+    - `share`: part of the residual's mean square that the curve removes, less the mean of the
+      draws.
     - `size`: root mean square of that, N; `p_value`, paid for by the number of coordinates.
     - `peak`: the strongest line's frequency, 1/m or Hz; NaN for curves.
     - `curve`: knots and force at them, N; empty for lines.

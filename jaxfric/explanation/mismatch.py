@@ -43,7 +43,7 @@ SURE = 3.5
 def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:
     """Which of a model's values are wrong on a recording; `None` if none is.
 
-    `refitted`: with all values free, beside the terms found: values and missing physics are judged
+    `refitted`: with all values free, beside the terms found: values and missing physics are tested
     together. The refitted parameters differ from the given ones (all of them together at 1 %) and
     take enough of the residual. Of those the fewest are moved that leave no more than all of them
     do, but for what no sensor of force resolves.

@@ -1,4 +1,4 @@
-"""Effects whose places the residual itself has to say."""
+"""Effects whose grid the residual itself determines: isolated pushes, say."""
 
 import numpy as np
 

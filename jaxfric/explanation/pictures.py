@@ -8,16 +8,16 @@ import numpy as np
 from ..looks import drawing
 
 # Coordinates drawn; those after them have less structure.
-PLACES = 2
+MAPS = 2
 
 
 def there(curves: Mapping[str, Any]) -> list[str]:
     """The names of the pictures that there are curves for."""
     count = len(curves.get("map") or ())
-    places = ["where", *(f"where {i}" for i in range(2, count + 1))][:count]
+    maps = ["where", *(f"where {i}" for i in range(2, count + 1))][:count]
     over_time = ["force", "residual"] * bool(curves.get("time"))
     rest = ["friction"] * bool(curves.get("friction")) + ["holdout"] * bool(curves.get("holdout"))
-    return [*places[:PLACES], *over_time, *rest, *places[PLACES:]]
+    return [*maps[:MAPS], *over_time, *rest, *maps[MAPS:]]
 
 
 def grid(figure, count: int) -> np.ndarray:

@@ -144,7 +144,7 @@ def _wider(
     recording: Motion, narrow: Evidence, delay=0.0, across=False, factor=2.0
 ) -> Evidence | None:
     """The recording through a wider kernel; `None` if whole steps between the nodes allow none, or
-    too few rows would be left to judge by.
+    too few rows would be left for a test of significance.
     """
     try:
         wide = gather(recording, round(factor * narrow.width), delay, across)

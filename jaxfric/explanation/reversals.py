@@ -45,13 +45,13 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
 
 
 def _one_way(slopes: np.ndarray) -> bool:
-    """Whether slopes are positive by more than chance, as they are and by their signs alone.
+    """Whether slopes are significantly positive, as they are and by their signs alone.
 
     Of slopes that are rest and rounding but for one or two, those decide whatever the others do.
     """
     draws = np.random.default_rng(0).choice([-1.0, 1.0], size=(DRAWS, len(slopes)))
-    # Asked up to three times of a recording, and rows opened by mistake spoil all that follows: so
-    # no draw at all may be as large, one chance in DRAWS each.
+    # The test is done up to three times on a recording, and rows across reversals by mistake spoil
+    # all that follows: so no draw at all may be as large.
     return all(np.max(draws @ values) < np.sum(values) for values in (slopes, np.sign(slopes)))
 
 

@@ -19,7 +19,7 @@ def sentence(
 ) -> str:
     """One finding as a sentence, with its share and what it could be instead.
 
-    **Arguments:** `name` of the effect; `extent` of the recording, by which its values are judged.
+    **Arguments:** `name` of the effect; `extent` of the recording, which some sentences depend on.
     """
     effect = EFFECTS[name]
     values = {n: float(estimate.value) for n, estimate in parameters.items()}

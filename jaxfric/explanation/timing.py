@@ -77,7 +77,7 @@ def overlooked(
     """A delay or lag beside the findings that is too long for its first order to show.
 
     Times are doubled from one sampling period on until undoing them does more harm than good, which
-    is at once where nothing is late. What is found is judged by the blocks, with random signs of
+    is at once where nothing is late. What is found is tested by the blocks, with random signs of
     what it changes in each of them, and has to show through a kernel of twice the width too.
     """
     if any(traits(term).late for term in found.last.terms):

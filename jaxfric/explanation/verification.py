@@ -1,4 +1,4 @@
-"""What a found term is worth: alone, on a recording that it has not seen, and to how much."""
+"""What a selected term removes: alone, on a held-out recording, and from which size on."""
 
 import numpy as np
 
@@ -129,8 +129,8 @@ def share(
 def nearer(more: np.ndarray, less: np.ndarray) -> bool:
     """Whether the residual of `more` is smaller than that of `less`, N, both `(J,)`.
 
-    Both are cut off at four of their standard deviations, by the median: isolated events of a
-    recording are not what a term is judged by.
+    Both are cut off at four standard deviations, by the median: isolated events of a recording say
+    nothing about a term.
     """
     limit = 4 * np.median(np.abs(more)) / 0.6745
     ours, theirs = (np.minimum(np.abs(r), limit) for r in (more, less))
