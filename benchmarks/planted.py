@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import recordings
 
-from jaxfric.cli import _configure, options
+from jaxfric.cli import _configure, options, values
 from jaxfric.data.io import write_text
 from jaxfric.validation import proof
 from jaxfric.validation.proof import comparing, planting
@@ -113,10 +113,10 @@ def parse() -> argparse.Namespace:
     parser.add_argument("--holdout", help="a second one, only judged on")
     parser.add_argument("--baseline", default="coulomb-viscous")
     parser.add_argument("--sizes", default="0.05,0.1,0.2", help="in parts of the Coulomb level")
-    parser.add_argument("--each", type=options.count, default=10, help="cases a size, recording")
-    parser.add_argument("--seed", type=options.count, default=1)
-    parser.add_argument("--jobs", type=options.count, default=1)
-    parser.add_argument("--limit", type=options.seconds, default=600.0)
+    parser.add_argument("--each", type=values.count, default=10, help="cases a size, recording")
+    parser.add_argument("--seed", type=values.count, default=1)
+    parser.add_argument("--jobs", type=values.count, default=1)
+    parser.add_argument("--limit", type=values.seconds, default=600.0)
     parser.add_argument("--out", default="planted")
     options.reading(parser)
     return parser.parse_args()

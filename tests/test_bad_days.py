@@ -13,7 +13,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import fleet, models, terms
-from jaxfric.cli import commands, main, options
+from jaxfric.cli import commands, main, options, values
 from jaxfric.data.io import read_with_notes, write_table, write_text
 from jaxfric.data.printable import printable
 from jaxfric.explanation import holdout
@@ -219,7 +219,7 @@ def test_what_a_link_leads_to_is_written(tmp_path):
 def test_what_cannot_be_replaced_is_refused_before_the_work(tmp_path, name, fault):
     (tmp_path / "loop").symlink_to("loop")
     with pytest.raises(ArgumentTypeError, match=fault):
-        options.output(str(tmp_path / name))
+        values.output(str(tmp_path / name))
     with pytest.raises(ValueError, match=fault):
         write_text(tmp_path / name, "x")
 
@@ -256,10 +256,10 @@ def test_no_output_replaces_another_or_an_input(tmp_path):
 
 
 def test_a_table_of_unknown_kind_is_refused_before_the_work(tmp_path):
-    assert options.table("-") == "-"
-    assert options.table("/dev/null") == "/dev/null"
+    assert values.table("-") == "-"
+    assert values.table("/dev/null") == "/dev/null"
     with pytest.raises(ArgumentTypeError, match=r"\.csv, \.npz, \.parquet"):
-        options.table(str(tmp_path / "a.xls"))
+        values.table(str(tmp_path / "a.xls"))
 
 
 # ---- fleets and proofs ----

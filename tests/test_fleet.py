@@ -1,5 +1,6 @@
 """Many recordings: found, read ahead, batched, resumed, compared, and written whole."""
 
+import argparse
 import csv
 import dataclasses
 import json
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jaxfric import cli, fleet
+from jaxfric import fleet
 from jaxfric.cli import main
 from jaxfric.cli.fleet import span
 from jaxfric.cli.values import process
@@ -300,7 +301,7 @@ def test_bad_input_is_one_message_and_no_output(tmp_path, monkeypatch, capsys, a
 @pytest.mark.parametrize("text", ["", "1/2", "2/2@host:1", "0/2@host", "a/2@host:1", "0/2@:1"])
 def test_a_process_is_named_by_number_and_address(text):
     assert process("1/2@host:80") == (1, 2, "host:80")
-    with pytest.raises(cli.argparse.ArgumentTypeError):
+    with pytest.raises(argparse.ArgumentTypeError):
         process(text)
 
 
