@@ -77,6 +77,7 @@ def test_a_push_below_break_away_is_held_by_a_spring():
     assert abs(x[-200:].mean()) < 0.4 * x[900:1000].mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("force", [15.0, 19.0, 40.0])
 def test_memory_never_drives_the_axis(force):
     """Not even where it takes more off than there is friction (40 N of 20)."""

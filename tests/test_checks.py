@@ -260,6 +260,7 @@ def real(folder):
     yield jf.read(folder / "ur10e" / "joint_1.csv", columns={"force": "current"})
 
 
+@pytest.mark.slow
 def test_real_positions_decimated_give_the_same_velocity_or_it_is_said(data_folder):
     """The velocity of the whole record is the reference; down to 20 Hz."""
     for whole in real(data_folder):

@@ -111,6 +111,7 @@ def test_the_flanks_of_a_gap_give_way_by_less_than_it():
         assert 0 < truth["windup"] <= 0.5001 * truth["half_gap"], seed
 
 
+@pytest.mark.slow
 def test_a_stop_is_where_the_axis_comes_to_it():
     """This one stays so far behind its set-point that a stop by the set-point is never reached."""
     (seed,) = (c.seed for c in planning.plan(360, 20261129, (0.02, 0.3)) if c.name == "00044")

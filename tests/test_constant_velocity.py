@@ -51,6 +51,7 @@ def test_points_are_the_friction_at_the_speeds_held():
     assert all(abs(g.low) < 0.02 or abs(g.high) < 0.08 for g in test.not_evaluated)
 
 
+@pytest.mark.slow
 def test_a_curve_that_is_too_simple_is_contradicted_and_the_right_one_is_not():
     recording = staircase(bumped)
     right, simple = (jf.identify(m, recording) for m in ("gaussian", "coulomb-viscous"))
@@ -79,6 +80,7 @@ def test_intervals_hold_the_friction():
     assert np.mean(inside) > 0.92
 
 
+@pytest.mark.slow
 def test_healthy_machines_are_not_contradicted():
     """Multisines with hidden load and encoder, and staircases: no warning in any."""
     drawn = fleet(12, seed=5, model="gaussian")

@@ -856,6 +856,7 @@ def test_a_load_that_wanders_within_the_noise_is_noise(healthy):
     assert structure.lasting(wandering, posed.base, posed) == wandering[1:]
 
 
+@pytest.mark.slow
 def test_the_held_out_recording_chooses_nothing(healthy):
     """Another motion, or one that contradicts: the findings and their values are the same."""
     run, again = (planted(each, *CASES["cogging"]) for each in healthy)
@@ -1014,6 +1015,7 @@ def test_a_term_has_to_predict_blocks_that_it_was_not_fitted_to(healthy):
     assert found == pytest.approx(power, rel=0.02)
 
 
+@pytest.mark.slow
 def test_all_findings_together_bring_a_model_nearer_to_the_held_out_recording(healthy, monkeypatch):
     """Each may seem to help, judged without that recording's events, while all do harm."""
     run = planted(healthy[0], *CASES["cogging"])

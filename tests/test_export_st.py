@@ -62,7 +62,12 @@ def test_a_block_computes_the_library_s_force_and_friction():
     np.testing.assert_allclose(friction, slip, rtol=1e-12, atol=1e-12 * np.abs(slip).max())
 
 
-@pytest.mark.parametrize("scale", [1.0, 1e-9, 1e12])
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "scale", [1.0, pytest.param(1e-9, marks=SLOW), pytest.param(1e12, marks=SLOW)]
+)
 def test_a_parser_of_the_standard_accepts_the_text(scale):
     blark = pytest.importorskip("blark", reason="parses Structured Text")
     whole = everything()

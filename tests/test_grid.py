@@ -149,6 +149,7 @@ def with_force(run, model, noise=0.0, seed=0):
     return dataclasses.replace(run, force=jnp.asarray(force))
 
 
+@pytest.mark.slow
 def test_thinned_rows_are_the_rows():
     run = with_force(motion(), models.from_parameters(models.coulomb_viscous(), BASE))
     rows = WeakForm(16).rows(run, scales_of(run))
@@ -234,6 +235,7 @@ PITCHES = {
 }
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(**PITCHES)
 def test_a_pitch_is_found_from_the_default_bounds(turns, phase, seed):
@@ -247,6 +249,7 @@ def test_any_pitch_is_found_from_the_default_bounds(turns, phase, seed):
     pitch_again(turns, phase, seed)
 
 
+@pytest.mark.slow
 def test_a_pitch_that_only_noise_suggests_has_rivals():
     """The best of many pitches in noise is as good as the next best, and both are told."""
     run = motion(duration=24.0, slow=0.25)

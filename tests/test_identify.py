@@ -45,13 +45,14 @@ def recording(model, noise=0.0, seed=0, **arguments):
     return dataclasses.replace(bare, force=force)
 
 
+OTHERS = ("coulomb-viscous", "exponential", "lorentzian")
+
+
 @pytest.mark.parametrize(
     "name",
     [
-        "coulomb-viscous",
         "gaussian",
-        "exponential",
-        pytest.param("lorentzian", marks=pytest.mark.slow),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in OTHERS),
     ],
 )
 @pytest.mark.parametrize("projection", [jf.ClosedWindows(), jf.WeakForm(16)])
@@ -74,6 +75,7 @@ def test_inertia_is_left_out_whatever_it_is():
     assert abs(heavy.parameters["inertia"].value - 300) < 0.3
 
 
+@pytest.mark.slow
 def test_a_batch_keeps_failures_in_their_row():
     # Without a position that the changed velocities would contradict.
     good = dataclasses.replace(recording(machine(), noise=0.1), position=None)
@@ -109,6 +111,7 @@ def test_a_model_that_leaves_most_of_the_force_is_said_to():
     assert "of the force is left" in poor.diagnosis
 
 
+@pytest.mark.slow
 def test_throw_raises_with_the_diagnosis():
     good = recording(machine())
     rest = dataclasses.replace(good, velocity=jnp.zeros_like(good.velocity))
@@ -164,6 +167,7 @@ def test_a_missing_signal_is_named():
         jf.identify(jf.models.coulomb_viscous() + Spring(), log)
 
 
+@pytest.mark.slow
 def test_a_term_of_the_users_own_is_identified_in_closed_windows():
     log = recording(machine("coulomb-viscous"))
     log = dataclasses.replace(log, force=log.force + 25.0 * log.velocity * jnp.abs(log.velocity))
@@ -211,6 +215,7 @@ def test_vmap_and_jit_agree_with_a_plain_call():
     np.testing.assert_allclose(jax.jit(cost)(log.force), cost(log.force), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_bounds_hold_and_the_border_is_reported():
     log = recording(machine(), noise=0.05)
     bounds = {"stribeck_velocity": (0.05, 0.09)}
@@ -229,6 +234,7 @@ def emps(folder, name="DATA_EMPS"):
     )
 
 
+@pytest.mark.slow
 def test_emps_friction_without_mass_and_acceleration(data_folder):
     """Published, with mass and acceleration: Janot, Gautier & Brunot 2019."""
     found = jf.identify("coulomb-viscous", emps(data_folder), projection=jf.ClosedWindows())
@@ -239,6 +245,7 @@ def test_emps_friction_without_mass_and_acceleration(data_folder):
     np.testing.assert_allclose(found.parameters["inertia"].value, 95.1089, rtol=0.005)
 
 
+@pytest.mark.slow
 def test_emps_weak_form_and_the_pulses(data_folder):
     identification, validation = emps(data_folder), emps(data_folder, "DATA_EMPS_PULSES")
     directional = jf.identify("coulomb-viscous", identification, projection=jf.WeakForm(16))

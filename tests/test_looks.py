@@ -455,6 +455,7 @@ def test_to_pandas_is_a_data_frame(fit):
     assert isinstance(fit.to_pandas(), pandas.DataFrame)
 
 
+@pytest.mark.slow
 def test_points_of_constant_velocity_and_bristles_print_as_text():
     recording = jf.scenario.record(jf.scenario.machine(), force_noise=0.5, key=jax.random.key(0))
     found = jf.identify("lorentzian", recording)

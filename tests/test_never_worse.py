@@ -246,6 +246,7 @@ def test_a_narrow_bump_is_no_higher_than_the_largest_force():
     )
 
 
+@pytest.mark.slow
 def test_identify_says_the_force_error_of_predict(tmp_path, healthy, capsys):
     log, model, out, document = (tmp_path / n for n in ("log.csv", "m.json", "o.csv", "i.json"))
     run = healthy[0]

@@ -118,6 +118,7 @@ def test_forgetting_follows_a_warm_up():
     assert np.min(np.abs(whole / level - 1)) > 0.08
 
 
+@pytest.mark.slow
 def test_a_step_of_friction_is_detected_and_followed():
     follower, changes = followed(120, size=lambda t: np.where(t > 80, 1.1, 1.0))
     assert len(changes) == 1
@@ -186,6 +187,7 @@ def write(path, seconds=120.0):
     path.write_text(f"time,position,force\n{rows}\n")
 
 
+@pytest.mark.slow
 def test_watch_follows_a_file(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     path = tmp_path / "axis.csv"

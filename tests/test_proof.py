@@ -305,6 +305,7 @@ def do(task):
         os.kill(os.getpid(), 9)
 
 
+@pytest.mark.slow
 def test_what_hangs_or_dies_costs_itself_only(tmp_path):
     kinds = ("well", "hang", "die", "die once", "well")
     tasks = [f"{tmp_path / str(i)}:{kind}" for i, kind in enumerate(kinds)]
@@ -323,6 +324,7 @@ def refuse():
     raise SystemExit(3)
 
 
+@pytest.mark.slow
 def test_processes_that_do_not_start_end_the_run():
     with pytest.raises(ValueError, match="before they were ready with status 3"):
         list(workers.work(["a:well"], do, jobs=2, prepare=refuse))

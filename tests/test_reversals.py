@@ -124,6 +124,7 @@ def names(found):
     return [taken.trial.candidate.effect.name for taken in found.selected]
 
 
+@pytest.mark.slow
 def test_what_does_not_act_at_reversals_is_found_without_them():
     problem, found = searched(hilly())
     assert problem.reversals and not problem.in_slip.reversals

@@ -46,6 +46,7 @@ def test_without_slow_motion_it_is_said_that_shapes_cannot_be_told():
     assert "because no motion below" in found.reason
 
 
+@pytest.mark.slow
 def test_the_standings_are_those_of_identifying_each_one():
     """The quick way on shared rows gives what fitting each model to each fold gives."""
     recording = machine("gaussian", 3)
@@ -66,6 +67,7 @@ def test_the_interval_and_the_order():
     assert all(0 < c.half_width < c.filtered_force_error for c in found.candidates)
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     recording = machine("gaussian", 2)

@@ -99,6 +99,7 @@ def test_the_derivative_is_the_stated_convolution():
     np.testing.assert_allclose(found[12:-12], expected[12:-12], rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rate", "kind"),
     [

@@ -167,6 +167,7 @@ def test_units_do_not_matter(force, position):
     np.testing.assert_allclose(b.force, a.force * f, atol=1e-6 * f)
 
 
+@pytest.mark.slow
 def test_default_substeps_are_accurate_and_grow_with_the_interval():
     model, counts = stribeck_axis(), []
     for rate in (200.0, 5000.0):
@@ -178,6 +179,7 @@ def test_default_substeps_are_accurate_and_grow_with_the_interval():
     assert counts[0] > counts[1] >= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smooth", [None, 5e-3])
 def test_gradient_matches_finite_differences(smooth):
     reference = sine(0.6, 500.0)

@@ -44,6 +44,7 @@ def test_one_wrong_value_is_one_wrong_value(healthy):
     assert found.verdict == "explained"
 
 
+@pytest.mark.slow
 def test_a_torque_constant_is_a_gain_and_nothing_else(healthy):
     louder = [dataclasses.replace(run, force=1.15 * run.force) for run in healthy]
     found = explain(louder[0], simulator(), louder[1])
@@ -53,6 +54,7 @@ def test_a_torque_constant_is_a_gain_and_nothing_else(healthy):
     assert "(the torque constant) is 1.1" in finding.sentence
 
 
+@pytest.mark.slow
 def test_missing_physics_beside_a_wrong_value(healthy):
     """The values are judged beside what is missing, not instead of it."""
     runs = [planted(run, *CASES["cogging"]) for run in healthy]
@@ -65,6 +67,7 @@ def test_missing_physics_beside_a_wrong_value(healthy):
     assert float(named["cogging"].parameters["pitch"].value) == pytest.approx(0.01, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_saved_model_stands_on_the_simulators_force(healthy, tmp_path):
     run = planted(healthy[0], *CASES["spring"])
     found = explain(run, simulator())
