@@ -13,6 +13,7 @@ import numpy as np
 from ..data.excerpt import MOST, cut, excerpt, pieces
 from ..data.recording import Recording
 from .clock import host_interval
+from .kernels import kernel
 
 # Half-widths, in samples, of the ladder: steps of about √2, which change the noise of a derivative
 # by √2³ = 2.8. From the third octave on the signal may be averaged in blocks first.
@@ -71,7 +72,7 @@ def weights(half_width: float, degree: int, order: int = 1, reach: int | None = 
     """
     reach = int(half_width) if reach is None else reach
     tau = np.arange(-reach, reach + 1) / (half_width + 0.5)
-    weight = np.maximum(1 - tau**2, 0.0) ** 4
+    weight = kernel(tau)
     # By symmetry the powers of the other parity have no part in it.
     powers = tau[:, None] ** np.arange(order % 2, degree + 1, 2)
     wanted = np.zeros(powers.shape[1])
@@ -252,7 +253,7 @@ def _local(
     span = (half_width + 0.5) * log.step
     tau = (log.time[at] - log.time[index][:, None]) / span
     near = log.valid[at] & (log.segment[at] == log.segment[index][:, None]) & (at == wanted)
-    weight = np.where(near, np.maximum(1 - tau**2, 0.0) ** 4, 0.0)
+    weight = np.where(near, kernel(tau), 0.0)
     tau = np.where(near, tau, 0.0)
     side = np.minimum(near[:, :half_width].sum(1), near[:, half_width + 1 :].sum(1))
     degrees = np.where(side < half_width / 2, max(2, degree - 2), degree)
