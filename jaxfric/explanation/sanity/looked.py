@@ -14,6 +14,7 @@ from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.prediction import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
+from ...terms.effects.end_stop import END_STOP
 from ..explained import Explanation
 from ..figures import Figures, cast
 from ..finding import Finding
@@ -227,5 +228,5 @@ _EQUATIONS = {
     "position_zero": "f(q − z)",
     "clock": "u(t) = f(t − τ)",
     "force_limit": "u_real = clip(u, ±U)",
-    "end_stop": "x ≤ x_s, or x ≥ x_s",
+    END_STOP.name: "x ≤ x_s, or x ≥ x_s",
 }

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...identification.uncertainty import Estimate
 from ...simulators import Mujoco
+from ...terms.effects.end_stop import END_STOP
 from ..quantities import quantity
 from . import limits
 from .contact import Contact
@@ -188,7 +189,14 @@ def _blocked(contact: Contact) -> Check:
     )
     apart = "Look at the machine there: does it touch its own end, or something beside it?"
     return Check(
-        "end_stop", text, True, False, contact.place, name, separate_by=apart, share=contact.share
+        END_STOP.name,
+        text,
+        True,
+        False,
+        contact.place,
+        name,
+        separate_by=apart,
+        share=contact.share,
     )
 
 
