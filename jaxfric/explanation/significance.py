@@ -63,28 +63,28 @@ class BlockBootstrap:
         self.basis = basis.astype(np.float32)
         self.residual = (residual / self.scale).astype(np.float32)
         count = int(block[-1]) + 1
-        self.members = (block[:, None] == np.arange(count)[None, :]).astype(np.float32)
-        self.by_block = self.members * self.residual[:, None]
+        ends = np.searchsorted(block, np.arange(count + 1)).tolist()
+        self.blocks = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
         signs = np.random.default_rng(seed).integers(0, 2, (DRAWS, count)) * 2.0 - 1.0
         self.signs = signs.astype(np.float32)
 
     def __call__(self, raw: np.ndarray, positive: bool = False) -> Scan:
         """Scan groups of columns, `(G, k, J)`; `positive`: single columns by that sign only."""
-        scan = self._scan(raw, self.by_block, positive)
+        scan = self._scan(raw, self.residual, positive)
         if len(raw) == 1 or scan.gain[scan.best] < MOSTLY:
             return scan
         own = self.new_columns(raw[scan.best : scan.best + 1])[0][0]
         left = self.residual - (own @ self.residual) @ own
         left /= np.linalg.norm(left)
-        rest = self._scan(raw, self.members * left[:, None], positive).drawn
+        rest = self._scan(raw, left, positive).drawn
         # The remainder beside the right grid point is not noise either: take the lower threshold.
         lower = np.quantile(rest, 1 - LEVEL) < np.quantile(scan.drawn, 1 - LEVEL)
         return scan._replace(drawn=rest) if lower else scan
 
-    def _scan(self, raw, by_block, positive) -> Scan:
+    def _scan(self, raw, residual, positive) -> Scan:
         size = max(1, CHUNK // raw.shape[1])
         parts = [
-            self._chunk(raw[i : i + size], by_block, positive) for i in range(0, len(raw), size)
+            self._chunk(raw[i : i + size], residual, positive) for i in range(0, len(raw), size)
         ]
         gain, null_mean, drawn, dimension = zip(*parts, strict=True)
         return Scan(
@@ -92,11 +92,11 @@ class BlockBootstrap:
             np.concatenate(dimension),
         )  # fmt: skip
 
-    def _chunk(self, raw, by_block, positive):
+    def _chunk(self, raw, residual, positive):
         own, dimension = self.new_columns(raw)
-        scores = own @ by_block
+        scores, lever = self._by_block(own, residual)
         fitted = scores.sum(axis=2)
-        noise = self._unexplained(own, scores, fitted)
+        noise = self._unexplained(lever, scores, fitted)
         g, k, b = noise.shape
         drawn = (noise.reshape(g * k, b) @ self.signs.T).reshape(g, k, -1)
         power = np.einsum("gkd,gkd->gd", drawn, drawn)
@@ -104,33 +104,46 @@ class BlockBootstrap:
             fitted = np.maximum(fitted, 0.0)
         return np.sum(fitted**2, axis=1), power.mean(axis=1), power.max(axis=0), dimension
 
-    def _unexplained(self, own, scores, fitted):
+    def _by_block(self, own, residual):
+        """Scores E_bᵀ r_b, `(G, k, B)`, and leverages E_bᵀ E_b, `(G, B, k, k)`, of each block."""
+        groups, k, size = own.shape
+        flat = own.reshape(-1, size)
+        scores = np.empty((groups * k, len(self.blocks)), own.dtype)
+        lever = np.empty((groups, len(self.blocks), k, k), own.dtype)
+        for b, rows in enumerate(self.blocks):
+            scores[:, b] = flat[:, rows] @ residual[rows]
+            part = own[..., rows]
+            if k > 2:
+                np.matmul(part, part.transpose(0, 2, 1), out=lever[:, b])
+                continue
+            for i, j in ((i, j) for i in range(k) for j in range(i + 1)):
+                lever[:, b, i, j] = lever[:, b, j, i] = np.vecdot(part[:, i], part[:, j])
+        return scores.reshape(groups, k, -1), lever
+
+    def _unexplained(self, lever, scores, fitted):
         """Scores of the group's residual, each block without its own influence on the fit.
 
         (I − H_b)⁻¹ (g_b − H_b a): the delete-one-block jackknife (Bell & McCaffrey 2002). A block
         with half of the leverage has no others to compare with and keeps g_b.
         """
-        k = own.shape[1]
-        lever = np.zeros((len(own), scores.shape[2], k, k), own.dtype)
-        for i in range(k):
-            for j in range(i, k):
-                lever[..., i, j] = (own[:, i] * own[:, j]) @ self.members
-                lever[..., j, i] = lever[..., i, j]
         left = scores.transpose(0, 2, 1) - np.einsum("gbij,gj->gbi", lever, fitted)
         alone = np.trace(lever, axis1=2, axis2=3) > 0.5
         safe = np.where(alone[..., None, None], 0.0, lever)
-        free = np.linalg.solve(np.eye(k, dtype=own.dtype) - safe, left[..., None])[..., 0]
+        matrix = np.eye(lever.shape[2], dtype=lever.dtype) - safe
+        free = np.linalg.solve(matrix, left[..., None])[..., 0]
         return np.where(alone[:, None], scores, free.transpose(0, 2, 1))
 
     def new_columns(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Orthonormal columns that each group adds, `(G, k, J)`, and how many, `(G,)`."""
-        size = np.sqrt(np.einsum("gkj,gkj->gk", raw, raw))
-        own = raw - (raw @ self.basis) @ self.basis.T
+        size = np.sqrt(np.vecdot(raw, raw))
+        flat = raw.reshape(-1, raw.shape[2])  # one product instead of one for each group
+        own = (flat @ self.basis) @ self.basis.T
+        own = np.subtract(flat, own, out=own).reshape(raw.shape)
         dimension = np.zeros(len(raw), int)
         for i in range(raw.shape[1]):
             for h in range(i):
-                own[:, i] -= own[:, h] * np.einsum("gj,gj->g", own[:, h], own[:, i])[:, None]
-            left = np.sqrt(np.einsum("gj,gj->g", own[:, i], own[:, i]))
+                own[:, i] -= own[:, h] * np.vecdot(own[:, h], own[:, i])[:, None]
+            left = np.sqrt(np.vecdot(own[:, i], own[:, i]))
             new = left > NEW * size[:, i]
             own[:, i] *= np.where(new, 1 / np.where(new, left, 1.0), 0.0)[:, None]
             dimension += new
