@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from .. import signals
 from ..data.recording import Recording
+from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
 # At the end of a clipped signal's range there are three times the samples of the band below it.
@@ -33,7 +33,9 @@ SHIFTED = 0.05
 ACROSS, FAR = 0.8, 0.3
 
 
-def force_faults(recording: Recording, velocity: np.ndarray, valid: np.ndarray) -> dict[str, float]:
+def force_faults(
+    recording: Recording, velocity: np.ndarray, valid: np.ndarray, clock: Clock
+) -> dict[str, float]:
     """Faults of the force by itself: levels, spikes, clipping, overflow, held or filled samples."""
     whole, force = np.asarray(recording.force, float), np.asarray(recording.force, float)[valid]
     levels = len(np.unique(force[:: max(1, len(force) // 20_000)]))
@@ -50,9 +52,10 @@ def force_faults(recording: Recording, velocity: np.ndarray, valid: np.ndarray) 
         found["force_clipped"] = share
     speed = np.abs(velocity)
     fast = speed > FAR * np.quantile(speed[valid], 0.98)
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
     step = np.abs(np.diff(whole)) > ACROSS * np.ptp(force[~alone])
-    across = step & linked & fast[1:] & fast[:-1] & (np.sign(velocity[1:] * velocity[:-1]) > 0)
+    across = (
+        step & clock.linked & fast[1:] & fast[:-1] & (np.sign(velocity[1:] * velocity[:-1]) > 0)
+    )
     if np.count_nonzero(across) > LONE:
         found["force_wraps"] = int(np.count_nonzero(across))
     found |= _held(force) or _interpolated(force)
@@ -115,7 +118,7 @@ def _filler(force: np.ndarray, speed: np.ndarray) -> dict[str, float]:
 
 
 def same_as_motion(
-    recording: Recording, velocity: np.ndarray, valid: np.ndarray
+    recording: Recording, velocity: np.ndarray, valid: np.ndarray, clock: Clock
 ) -> dict[str, float]:
     """Whether the force is another signal of the recording, times a constant, plus another."""
     force = np.asarray(recording.force, float)[valid]
@@ -125,18 +128,19 @@ def same_as_motion(
     for values in motion.values():
         if (left := _left(force, values)) < PROPORTIONAL:
             return {"force_is_motion": left}
-    gained = _gains(recording, velocity)
+    gained = _gains(recording, velocity, clock)
     left = _left(*gained) if len(gained[0]) > PIECE else 1.0
     return {"force_is_acceleration": left} if left < PROPORTIONAL else {}
 
 
-def _gains(recording: Recording, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _gains(
+    recording: Recording, velocity: np.ndarray, clock: Clock
+) -> tuple[np.ndarray, np.ndarray]:
     """The mean force over short unbroken spans, and what the velocity gains in them: a force that
     only accelerates is proportional to that, with no derivative taken.
     """
     force, count = np.asarray(recording.force, float), len(velocity) // SPAN
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
-    whole = np.add.reduceat(~linked, np.arange(0, count * SPAN, SPAN))[:count] == 0
+    whole = np.add.reduceat(~clock.linked, np.arange(0, count * SPAN, SPAN))[:count] == 0
     ends = np.arange(count)[whole] * SPAN
     ends = ends[ends + SPAN < len(velocity)]
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))])

@@ -16,7 +16,8 @@ CYCLE = 16
 
 def lone(values: np.ndarray) -> np.ndarray:
     """Samples that no motion or actuator made: at most three in a row, far beyond all others."""
-    size = np.abs(values - np.median(values))
+    size = values - np.median(values)
+    np.abs(size, out=size)
     at = len(size) - 1 - max(LONE, int(RAREST * len(size)))
     usual = np.partition(size, at)[at]
     far = (size > BEYOND * usual) & (usual > 0)

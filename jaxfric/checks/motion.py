@@ -5,6 +5,7 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording
 from ..signals.polynomial import white_noise
+from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
@@ -32,20 +33,18 @@ ONE_SPEED = 1.1
 MOVING, RARE = 0.05, 0.01
 
 
-def clock_faults(recording: Recording) -> dict[str, float]:
+def clock_faults(recording: Recording, clock: Clock) -> dict[str, float]:
     """Into how many pieces a clock that is broken cuts the recording."""
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
     valid = int(np.count_nonzero(np.asarray(recording.mask)))
-    pieces = valid - int(np.count_nonzero(linked))
+    pieces = valid - int(np.count_nonzero(clock.linked))
     return {"broken_clock": pieces} if pieces > 1 and valid / pieces < PIECE else {}
 
 
-def jumps(recording: Recording, velocity: np.ndarray) -> int:
+def jumps(recording: Recording, velocity: np.ndarray, clock: Clock) -> int:
     """Lone samples of a recorded velocity that are further from both neighbours than the top speed;
     a jump of the acceleration, as at a reversal, is far less.
     """
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
-    bend = np.diff(velocity, 2)[linked[1:] & linked[:-1]]
+    bend = np.diff(velocity, 2)[clock.linked[1:] & clock.linked[:-1]]
     bend = bend[np.isfinite(bend)]
     if len(bend) <= 2 * LONE:
         return 0
@@ -53,10 +52,9 @@ def jumps(recording: Recording, velocity: np.ndarray) -> int:
     return -(-int(np.count_nonzero(lone(bend) & (np.abs(bend) > top))) // LONE)
 
 
-def coarse(recording: Recording, velocity: np.ndarray) -> dict[str, float]:
+def coarse(recording: Recording, velocity: np.ndarray, clock: Clock) -> dict[str, float]:
     """Samples a cycle of a recorded velocity, at the root mean square of its frequency, if few."""
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
-    step, speed = np.diff(velocity)[linked], velocity[np.asarray(recording.mask)]
+    step, speed = np.diff(velocity)[clock.linked], velocity[np.asarray(recording.mask)]
     power, size = np.nanmean(step**2) if len(step) else 0.0, np.nanmean(speed**2)
     if not power > 0 or not size > 0:
         return {}
@@ -88,11 +86,10 @@ def speed_faults(velocity: np.ndarray, valid: np.ndarray, unit: str) -> dict[str
     return found
 
 
-def position_faults(recording: Recording) -> dict[str, float]:
+def position_faults(recording: Recording, clock: Clock) -> dict[str, float]:
     """Lone samples of the position: one such makes its second difference g, −2 g, g."""
     position, time = np.asarray(recording.position, float), np.asarray(recording.time, float)
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
-    whole = linked[1:] & linked[:-1]
+    whole = clock.linked[1:] & clock.linked[:-1]
     bend = np.diff(position, 2) / np.maximum(np.diff(time)[1:] + np.diff(time)[:-1], 1e-300)
     bend = bend[whole & np.isfinite(bend)]
     if len(bend) <= 2 * LONE:
@@ -117,9 +114,9 @@ def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str,
     return {"coarse_sampling" if biased else "velocity_noise": choice.error / size}
 
 
-def compared(recording: Recording) -> dict[str, float]:
+def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     """The recorded velocity's integral beside the position's increments, over the same spans."""
-    moved, driven, step = _increments(recording)
+    moved, driven = _increments(recording, clock)
     if len(moved) < 32 or not (np.any(moved) and np.any(driven)):
         return {}
     shared, lag = _correlation(moved, driven)
@@ -130,7 +127,7 @@ def compared(recording: Recording) -> dict[str, float]:
         return {"velocity_sign": shared}
     found = {}
     if shared**2 - at_once**2 > LATE and abs(lag) > 1:
-        found["velocity_late"] = lag * step
+        found["velocity_late"] = lag * clock.interval
     late = slice(lag, None) if lag >= 0 else slice(None, lag)
     early = slice(None, len(moved) - lag) if lag >= 0 else slice(-lag, None)
     a, b = moved[early], driven[late]
@@ -141,14 +138,12 @@ def compared(recording: Recording) -> dict[str, float]:
     return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
 
 
-def _increments(recording: Recording) -> tuple[np.ndarray, np.ndarray, float]:
+def _increments(recording: Recording, clock: Clock) -> tuple[np.ndarray, np.ndarray]:
     """What the position and the velocity say the axis moved in spans that stand out of the noise,
-    both `(n,)` and unbroken, and the sampling interval, s.
+    both `(n,)` and unbroken.
     """
     position, velocity = (np.asarray(x, float) for x in (recording.position, recording.velocity))
-    typical = signals.host_interval(recording)
-    linked = signals.host_continuous(recording, typical)
-    linked &= np.isfinite(position[1:] + position[:-1] + velocity[1:] + velocity[:-1])
+    linked = clock.linked & np.isfinite(position[1:] + position[:-1] + velocity[1:] + velocity[:-1])
     steps = np.where(linked, np.diff(np.asarray(recording.time, float)), 0.0)
     mean = np.where(linked, 0.5 * (velocity[1:] + velocity[:-1]), 0.0)
     moved = np.concatenate([[0], np.cumsum(np.where(linked, np.diff(position), 0.0))])
@@ -159,7 +154,7 @@ def _increments(recording: Recording) -> tuple[np.ndarray, np.ndarray, float]:
         and float(np.std(moved[span:] - moved[:-span])) < ABOVE_NOISE * noise
     ):
         span *= 2
-    return moved[span:] - moved[:-span], driven[span:] - driven[:-span], typical
+    return moved[span:] - moved[:-span], driven[span:] - driven[:-span]
 
 
 def _correlation(moved: np.ndarray, driven: np.ndarray) -> tuple[float, int]:

@@ -4,6 +4,7 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
+from .clock import clock_of
 from .force import force_faults, same_as_motion
 from .kinds import places
 from .lone import PIECE
@@ -27,22 +28,23 @@ def recorded(recording: Recording) -> np.ndarray:
     valid = np.asarray(recording.mask) & np.isfinite(np.asarray(recording.force, float))
     if np.count_nonzero(valid) <= 2 * PIECE:
         return places(found)
-    found |= clock_faults(recording)
+    clock = clock_of(recording)
+    found |= clock_faults(recording, clock)
     if recording.position is not None:
-        found |= position_faults(recording)
+        found |= position_faults(recording, clock)
         if recording.velocity is not None:
-            found |= compared(recording)
+            found |= compared(recording, clock)
     choice = signals.choose(recording) if recording.velocity is None else None
     velocity = np.asarray(signals.prepare(recording, choice).velocity, float)
     valid &= np.isfinite(velocity)
     if choice is not None:
         found |= derivative_faults(choice, velocity[valid])
     else:
-        found |= coarse(recording, velocity)
-    if choice is None and (spikes := jumps(recording, velocity)) > 0:
+        found |= coarse(recording, velocity, clock)
+    if choice is None and (spikes := jumps(recording, velocity, clock)) > 0:
         found["velocity_spikes"] = spikes
     found |= speed_faults(velocity, valid, recording.unit_names["position"])
-    found |= force_faults(recording, velocity, valid)
+    found |= force_faults(recording, velocity, valid, clock)
     if "no_motion" not in found:
-        found |= same_as_motion(recording, velocity, valid)
+        found |= same_as_motion(recording, velocity, valid, clock)
     return places(found)

@@ -116,8 +116,9 @@ class BlockBootstrap:
             if k > 2:
                 np.matmul(part, part.transpose(0, 2, 1), out=lever[:, b])
                 continue
-            for i, j in ((i, j) for i in range(k) for j in range(i + 1)):
-                lever[:, b, i, j] = lever[:, b, j, i] = np.vecdot(part[:, i], part[:, j])
+            for i in range(k):
+                for j in range(i + 1):
+                    lever[:, b, i, j] = lever[:, b, j, i] = np.vecdot(part[:, i], part[:, j])
         return scores.reshape(groups, k, -1), lever
 
     def _unexplained(self, lever, scores, fitted):

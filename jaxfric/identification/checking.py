@@ -37,17 +37,24 @@ def checked(
     `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
     """
     warnings = np.array(faults, ndmin=2)
-    motion = (recording.time, recording.position, recording.mask)
-    host = jax.tree.map(np.asarray, (found, design, motion))
-    for i in range(len(warnings)):
-        row, own, where = jax.tree.map(lambda x, i=i: x[i], host) if faults.ndim == 2 else host
-        fitted = checks.fitted(own, float(row.filtered_force_error))
-        time, position, mask = where
-        alpha, sure = _certain(row)
-        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
-            fitted[STRUCTURE] = float(row.filtered_force_error)
+    names, batch = found.names[: len(found.model.term.affine)], faults.ndim == 2
+    host = jax.tree.map(np.asarray, (design, recording.time, recording.position, recording.mask))
+    alphas, matrices, errors = (
+        np.array(x, float, ndmin=n)
+        for x, n in ((found.model.alpha, 2), (found.covariance, 3), (found.filtered_force_error, 1))
+    )
+    spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
+    halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
+    passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
+    for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
+        own, *where = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
+        fitted = checks.fitted(own, float(error))
+        # Those told from zero, of the ones that no passive axis has below it.
+        sure = [k for k in passive if abs(alpha[k]) > half[k]]
+        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, *where, alpha, sure):
+            fitted[STRUCTURE] = error
         warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
-        if (negative := _negative(row)) > 0:
+        if negative := int(np.sum((alpha + half)[passive] < 0)):
             warnings[i, checks.NAMES.index("negative_parameter")] = negative
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
@@ -58,32 +65,6 @@ def checked(
 
 
 STRUCTURE = checks.NAMES.index("structure_left")
-
-
-def _passive(row: Identified) -> list[int]:
-    """Numbers of inertia, Coulomb and viscous friction among the affine parameters."""
-    affine = row.names[: len(row.model.term.affine)]
-    return [i for i, n in enumerate(affine) if n.startswith(("inertia", "coulomb", "viscous"))]
-
-
-def _half_widths(row: Identified) -> np.ndarray:
-    """Halves of the 95 % intervals of the affine parameters, `(p,)`; infinite where unknown."""
-    count = len(row.model.term.affine)
-    variance = np.diagonal(np.asarray(row.covariance, float))[:count]
-    return uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(variance)
-
-
-def _negative(row: Identified) -> int:
-    """How many of inertia, Coulomb and viscous friction are negative beyond their intervals."""
-    high = np.asarray(row.model.alpha, float) + _half_widths(row)
-    return int(np.sum(high[_passive(row)] < 0))
-
-
-def _certain(row: Identified) -> tuple[np.ndarray, list[int]]:
-    """The affine parameters, and which of the passive ones are told from zero."""
-    alpha = np.asarray(row.model.alpha, float)
-    sure = np.abs(alpha) > _half_widths(row)
-    return alpha, [i for i in _passive(row) if sure[i]]
 
 
 # What says more than that signals contradict each other.
