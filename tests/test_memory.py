@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.data import writing
 from jaxfric.data.excerpt import MOST, PIECES, excerpt
 from jaxfric.data.recording import pad
 from jaxfric.models import from_parameters
@@ -103,3 +104,12 @@ def test_identify_takes_a_hundred_bytes_by_the_row(tmp_path):
     """Of the rows beyond those that are fitted; it was 900."""
     small, large = (written(tmp_path / f"{n}.npz", n) for n in (500_000, 2_500_000))
     assert (resident("identify", large) - resident("identify", small)) / 2_000_000 < 120
+
+
+def test_a_table_written_in_parts_is_whole(tmp_path, monkeypatch):
+    columns = {"a": np.arange(10.0) / 7, "b": np.arange(10)}
+    whole = writing.csv_text(columns)
+    monkeypatch.setattr(writing, "ROWS", 3)
+    writing.write_table(tmp_path / "table.csv", columns)
+    assert (tmp_path / "table.csv").read_text() == whole
+    assert whole.splitlines()[0] == "a,b" and len(whole.splitlines()) == 11

@@ -3,7 +3,7 @@
 import csv
 import os
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from io import StringIO
 from pathlib import Path
@@ -13,6 +13,9 @@ import numpy as np
 
 from .tables import optional
 from .targets import replaced, stream
+
+# Rows of a table that are spelled together.
+ROWS = 1 << 16
 
 
 def write_text(path: str | os.PathLike, text: str) -> None:
@@ -49,7 +52,7 @@ def write_table(path: str | os.PathLike, columns: Mapping[str, object]) -> None:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
         raise ValueError(f"{path}: a table needs columns of one length; given: {shapes or 'none'}.")
     writers: dict[str, Callable[[IO[bytes]], object]] = {
-        ".csv": lambda file: file.write(csv_text(arrays).encode("utf-8")),
+        ".csv": lambda file: file.writelines(part.encode("utf-8") for part in _csv_parts(arrays)),
         ".npz": lambda file: np.savez_compressed(file, **arrays),
         ".parquet": lambda file: _write_parquet(file, arrays, path),
     }
@@ -62,11 +65,20 @@ def write_table(path: str | os.PathLike, columns: Mapping[str, object]) -> None:
 
 def csv_text(arrays: Mapping[str, np.ndarray]) -> str:
     """Columns of one length as CSV."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(arrays)
-    writer.writerows(zip(*(array.tolist() for array in arrays.values()), strict=True))
-    return text.getvalue()
+    return "".join(_csv_parts(arrays))
+
+
+def _csv_parts(arrays: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """The same, some thousand rows at once."""
+    length = len(next(iter(arrays.values())))
+    for start in range(0, max(length, 1), ROWS):
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        if start == 0:
+            writer.writerow(arrays)
+        columns = (array[start : start + ROWS].tolist() for array in arrays.values())
+        writer.writerows(zip(*columns, strict=True))
+        yield text.getvalue()
 
 
 def _write_parquet(file: IO[bytes], arrays: Mapping[str, np.ndarray], path: Path) -> None:

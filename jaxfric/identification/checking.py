@@ -47,11 +47,12 @@ def checked(
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
-        own, *where = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
+        row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
+        own, time, position, mask = row
         fitted = checks.fitted(own, float(error))
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
-        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, *where, alpha, sure):
+        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
             fitted[STRUCTURE] = error
         warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         if negative := int(np.sum((alpha + half)[passive] < 0)):

@@ -35,9 +35,10 @@ def _linked(recording: Recording) -> Bool[Array, " M"]:
 
 def host_interval(recording: Recording) -> float:
     """[`interval`][] of a recording that is not traced, on the host; NaN without valid steps."""
-    steps = np.diff(np.asarray(recording.time, float))[_linked_on_host(recording)]
-    steps = steps[~np.isnan(steps)]
-    return float(np.median(steps)) if steps.size else float("nan")
+    steps = np.diff(np.asarray(recording.time, float))
+    known = _linked_on_host(recording) & ~np.isnan(steps)
+    steps = steps if known.all() else steps[known]
+    return float(np.median(steps, overwrite_input=True)) if steps.size else float("nan")
 
 
 def _linked_on_host(recording: Recording) -> np.ndarray:

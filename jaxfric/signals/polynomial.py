@@ -153,7 +153,10 @@ class _Log(NamedTuple):
         signal = signal if valid.all() else np.where(valid, signal, 0.0)
         together = valid[1:] & valid[:-1] & (segment[1:] == segment[:-1])
         with np.errstate(invalid="ignore"):
-            regular = together & (np.abs(np.diff(time) / step - 1) <= EVEN)
+            off = np.diff(time)  # in place: of a long record each copy counts
+            off /= step
+            off -= 1
+            regular = together & (np.abs(off, out=off) <= EVEN)
         even = np.zeros(len(time), np.int32)
         np.cumsum(~regular, dtype=np.int32, out=even[1:])
         longest = int(np.max(np.bincount(segment[valid]), initial=0)) if valid.any() else 0
