@@ -52,7 +52,7 @@ def document(better: Improved, filtered: dict, model: Model, figures: Figures) -
         "holdout_force_error": pair(before.held, after.held),
         "holdout_adjusted": _adjusted(better.findings) if problem.held else None,
         "holdout_refitted_error": refitted["error"],
-        "holdout_values": refitted.get("values"),
+        "holdout_values": refitted["values"],
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach),
         "filtered_force_error": filtered["force_error"]
@@ -70,7 +70,7 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     """
     problem, selection = findings.undelayed
     if problem.held is None:
-        return dict.fromkeys(("error", "filtered"))
+        return dict.fromkeys(("error", "filtered", "values"))
     carried = verification.carried(selection.last, problem.held, selection.rephased)
     again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
     model = spelled.model(findings.with_late(again), problem.evidence.motion.units)

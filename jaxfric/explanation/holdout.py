@@ -44,11 +44,9 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     moment need not recur, and are not tested.
     """
     findings = _rephased(_with_rows(better.findings, holdout))
-    borne = [
-        False if each and nil else each
-        for number, nil in enumerate(_nil_in_both(findings))
-        for each in (_borne_out(findings, number),)
-    ]
+    nil = _nil_in_both(findings)
+    borne = [_borne_out(findings, number) for number in range(len(nil))]
+    borne = [each and not none for each, none in zip(borne, nil, strict=True)]
     findings = findings.with_selected([
         selected._replace(confirmed=each)
         for selected, each in zip(findings.selection.selected, borne, strict=True)
