@@ -118,7 +118,8 @@ class Bristled(eqx.Module):
         there = bristles.dry(self.model.term, self.model.alpha, ends)
         taken = self._lagging(ends, jnp.zeros(len(self._terms()), dtype))
         least = jnp.maximum(jnp.minimum(there[0], -there[1]), 0.0)
-        most = jnp.maximum(-taken[0], taken[1])
+        # A few roundings more, lest the terms drive the axis by what two sums of the same differ.
+        most = jnp.maximum(-taken[0], taken[1]) * (1 + 16 * jnp.finfo(dtype).eps)
         return jnp.where(most > least, least / jnp.where(most > 0, most, 1.0), 1.0)
 
     def _turning(self, v, beside, z) -> Float[Array, " m"]:
