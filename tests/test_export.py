@@ -60,6 +60,17 @@ LAWS = {
         terms.Coulomb() + terms.Viscous() + terms.Gaussian(0.08),
     ),
     "directions of two kinds": Directional(terms.Gaussian(0.05), terms.Viscous()),
+    "gravity": terms.Gravity(0.8),
+    "payload": terms.PayloadChange(step_time=0.1),
+    "payload on an angle": terms.PayloadChange(
+        terms.Inertia() + terms.Gravity(0.7), step_time=-0.3, ramp=0.2
+    ),
+    "gain asymmetry": terms.GainAsymmetry(),
+    "dead-band": terms.ActuatorDeadband(),
+    "saturation": terms.ActuatorSaturation(4.0),
+    "load friction": terms.LoadDependentFriction(),
+    "gain step": terms.GainStep(-0.1, ramp=0.3),
+    "gain by direction": Directional(terms.GainAsymmetry()),
 }
 
 
@@ -82,12 +93,22 @@ def motion(count=400, seed=1):
 
 def force_of(model, x, v, a, t):
     """The library's force, the derivative of momentum taken exactly."""
+    channels = {}
 
-    def momentum(position, velocity):
-        return model.momentum(Recording(t, jnp.zeros_like(t), position, velocity))
+    def motion_of(position, velocity, time):
+        return Recording(time, jnp.zeros_like(t), position, velocity, channels=channels)
 
-    rate = jax.jvp(momentum, (x, v), (v, a))[1]
-    return model.force(Recording(t, jnp.zeros_like(t), x, v)) + rate
+    def whole(some):
+        def momentum(position, velocity, time):
+            return some.momentum(motion_of(position, velocity, time))
+
+        # Of a load that is taken up in a ramp the momentum changes with time, too.
+        rate = jax.jvp(momentum, (x, v, t), (v, a, jnp.ones_like(t)))[1]
+        return some.force(motion_of(x, v, t)) + rate
+
+    if "predicted_force" in model.term.coordinates:
+        channels = {"predicted_force": whole(model.without("predicted_"))}
+    return whole(model)
 
 
 @pytest.fixture(scope="module")
@@ -195,7 +216,7 @@ def translated(expression, names):
 def parsed(text):
     """Parameters and equations of a block."""
     parameters = re.findall(r"parameter Real (\w+)(?:\(unit=\"[^\"]*\"\))? = (\S+) \"", text)
-    equations = re.findall(r"^  (friction|force) = (.*?);$", text, re.MULTILINE | re.DOTALL)
+    equations = re.findall(r"^  (friction|f|force) = (.*?);$", text, re.MULTILINE | re.DOTALL)
     return {name: float(value) for name, value in parameters}, dict(equations)
 
 
@@ -207,8 +228,9 @@ def test_modelica_computes_the_library_s_force():
     functions |= {name: getattr(np, name) for name in ("sign", "abs", "exp", "sin", "cos")}
     names = parameters | functions | {"x": x, "v": v, "a": a, "t": t}
     names = {k: np.asarray(z) if isinstance(z, jax.Array) else z for k, z in names.items()}
-    friction = translated(" ".join(equations["friction"].split()), names)
-    force = translated(" ".join(equations["force"].split()), names | {"friction": friction})
+    for name in ("friction", "f", "force"):
+        names[name] = translated(" ".join(equations[name].split()), names)
+    friction, force = names["friction"], names["force"]
     np.testing.assert_allclose(friction, known.friction(v), rtol=1e-11, atol=1e-11)
     np.testing.assert_allclose(force, force_of(known, x, v, a, t), rtol=1e-11, atol=1e-10)
 
@@ -366,7 +388,8 @@ def test_memory_and_channels_are_left_out_of_a_joint_and_said(target):
     term = terms.Coulomb() + terms.Dahl(1e-3) + terms.ActuatorDeadband()
     found = export(model(term), target)
     assert "presliding: up to" in found.left_out[0]
-    assert "actuator_deadband: not counted" in found.left_out[1]
+    whole = "actuator_deadband: it depends on the whole force, which is not all here (not counted)"
+    assert whole in found.left_out[1]
     assert found.force_error.worst > 0
 
 
@@ -440,17 +463,35 @@ def test_a_table_without_a_range_asks_for_one():
 @pytest.mark.parametrize(
     ("target", "term", "words"),
     [
-        ("c", terms.Dahl(1e-3), "presliding.*memory.*modelica can"),
-        ("c", terms.Backlash(1e-3), "backlash.*memory.*no target can"),
+        ("c", terms.Dahl(1e-3), "presliding: it has a memory.*; up to .* N around a reversal"),
+        ("fmu", terms.Dahl(1e-3), "presliding: it has a memory"),
+        ("c", terms.Backlash(1e-3), "backlash: it has a memory"),
+        ("st", terms.Compliance(20.0, 0.1), "compliance: it has a memory, and a .* has none$"),
         ("table", terms.Dahl(1e-3), "presliding.*memory"),
-        ("c", terms.LoadDependentFriction("load"), "load_dependent_friction.*load, which"),
-        ("modelica", terms.ActuatorLag(), "actuator_lag.*predicted_force.*mujoco and urdf"),
-        ("table", terms.ThermalDrift(time_constant=2.0), "thermal_drift.*c and modelica can"),
+        ("c", terms.LoadDependentFriction("load"), "load_dependent_friction: it needs load, which"),
+        ("c", terms.TransportDelay(), "delay: hand over the motion commanded 0.* s later instead$"),
+        ("modelica", terms.ActuatorLag(), "actuator_lag: hand over .* instead, to first order"),
+        ("fmu", terms.KnownForce(), "the other simulator's force: add to it"),
+        ("table", terms.GainAsymmetry(), "gain_asymmetry: it depends on the whole force"),
+        ("table", terms.ThermalDrift(time_constant=2.0), "thermal_drift: it has no form there"),
     ],
 )
-def test_what_a_target_cannot_express_is_named_with_those_that_can(target, term, words):
-    with pytest.raises(ValueError, match=words):
-        export(model(terms.Coulomb() + term), target)
+def test_what_a_target_cannot_hold_is_left_out_and_named(target, term, words):
+    found = export(model(terms.Coulomb() + term), target)
+    assert re.search(words, "\n".join(found.left_out))
+    # The reader of the file alone is told, too, and no parameter of it is left behind.
+    told = " ".join(found.text.split()).replace(" * Left", " Left")
+    assert target == "table" or f"Left out: {found.left_out[0].split(':')[0]}" in told
+    assert all(f"{p.name} " not in found.text.split("Left out")[0] for p in term.affine)
+    if target != "table":
+        assert export(model(terms.Coulomb()), target).force_error == found.force_error
+
+
+def test_beside_another_simulator_s_force_nothing_acts_on_a_part_of_it():
+    term = terms.KnownForce() + terms.Coulomb() + terms.GainAsymmetry()
+    found = export(model(term), "c")
+    assert "gain_asymmetry: it depends on the whole force" in found.left_out[1]
+    assert "const double f" not in found.text
 
 
 @pytest.mark.parametrize(
@@ -507,11 +548,11 @@ def test_without_a_file_the_text_goes_out_alone(saved, capsys):
 def test_bad_input_writes_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     path, out = tmp_path / "model.json", tmp_path / "axis.c"
-    path.write_text(json.dumps(model(terms.Coulomb() + terms.Dahl(1e-3)).to_dict()), "utf-8")
-    assert main(["export", str(path), "--to", "c", "-o", str(out)]) == 2
+    path.write_text(json.dumps(model(terms.Coulomb() + terms.Spring(0.1)).to_dict()), "utf-8")
+    assert main(["export", str(path), "--to", "table", "-o", str(out)]) == 2
     printed = capsys.readouterr()
     assert printed.err.count("\n") == 1 and "model.json" in printed.err
-    assert "presliding" in printed.err and not out.exists()
+    assert "--position" in printed.err and not out.exists()
 
 
 def test_friction_that_drives_is_remarked_on():

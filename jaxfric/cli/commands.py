@@ -35,6 +35,7 @@ from ..signals import kernel_half_width, prepare
 from ..simulation.prediction import delay_of, force_error, in_motion, relative, residual
 from ..units import SI
 from .messages import message, say
+from .saving import saved
 
 
 def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[str]]:
@@ -182,6 +183,7 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
             raise ValueError(f"{path}: there is no model to save or draw. {document['diagnosis']}")
     if arguments.save:
         put(arguments.save, documents.to_json(documents.saved(stick.model, recording)))
+        saved(arguments.save, stick.model)
     if arguments.plot:
         draw(found, recording, arguments.plot)
     return document

@@ -24,6 +24,7 @@ from ..terms.effects import EFFECTS
 from . import benefit, robot
 from .commands import put, read, today, working
 from .messages import say
+from .saving import saved
 
 
 def run(arguments: Namespace) -> int:
@@ -73,6 +74,8 @@ def run(arguments: Namespace) -> int:
         put(path, text)
     if not any(standard(path) for path in texts):
         say(tabulate.explanation(document))
+    if arguments.save:
+        saved(arguments.save, found.model)
     return 0
 
 

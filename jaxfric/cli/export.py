@@ -60,7 +60,7 @@ def summary(found: Exported, model: Model, target: str) -> str:
 def _cost(found: Exported, model: Model) -> str:
     rms, relative, worst, unit = found.force_error
     if found.speed is None:
-        return "none but rounding"
+        return "none but rounding" + " in what is written" * bool(found.left_out)
     low, high = found.speed
     speeds = f"{low:.4g} to {high:.4g} {spell(VELOCITY, dict(model.units))}"
     return f"{relative:.2%} ({rms:.3g} {unit} rms, {worst:.3g} {unit} at most) over {speeds}"

@@ -19,6 +19,7 @@ from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.presliding import AbstractBristle
 from .commands import _load, put, read, working
 from .messages import say
+from .saving import saved
 
 SCHEMA = "jaxfric.presliding/1"
 
@@ -41,6 +42,7 @@ def run(arguments: Namespace) -> int:
         if test.model is None:
             raise ValueError(f"{arguments.file}: there are no bristles to save; {test.why}.")
         put(arguments.save, documents.to_json(documents.saved(test.model, recording)))
+        saved(arguments.save, test.model)
     if arguments.json:
         put(arguments.json, documents.to_json(_document(found, test, errors, recording, notes)))
     if not any(path and standard(path) for path in (arguments.json, arguments.save)):

@@ -26,6 +26,7 @@ from ..simulators.patching import folder_of, patched
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .commands import put, read, today, working
 from .messages import message, say
+from .saving import saved
 
 SCHEMA = "jaxfric.robot/1"
 # What the log of one joint gives no role to.
@@ -352,3 +353,5 @@ def _print(arguments: Namespace, found: list[Joint], done: Patch | None) -> None
         say(tabulate.joints(arguments.mujoco, arguments.file, [_row(joint) for joint in found]))
     if done is not None:
         say(f"\n{tabulate.patch(arguments.save, done.to_dict())}")
+    elif arguments.save and found[0].told is not None:
+        saved(arguments.save, found[0].told.model)

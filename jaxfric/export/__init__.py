@@ -2,3 +2,4 @@
 
 from .exporting import TARGETS as TARGETS, export as export
 from .outcome import Exported as Exported, ForceError as ForceError
+from .parts import unwritten as unwritten

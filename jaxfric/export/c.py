@@ -6,7 +6,7 @@ from itertools import groupby
 
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, levels, lines, parts, refuse
+from .parts import Divided, Line, Part, constants, divided, levels, lines, unwritten
 from .syntax import C, identifier, literal
 
 _KEYWORDS = set(
@@ -17,28 +17,27 @@ _KEYWORDS = set(
 
 
 def export(model: Model, name: str = "axis") -> Exported:
-    """A self-contained C99 text with `NAME_friction` and `NAME_force`; exact.
+    """A self-contained C99 text with `NAME_friction` and `NAME_force`; exact in what it holds.
 
-    **Raises:** `ValueError` for a name that is none in C, and for terms with memory or channels.
+    Terms with memory or channels, and a delay, are left out and named, in the text too.
+
+    **Raises:** `ValueError` for a name that is none in C.
     """
     check_name(name)
-    every = parts(model)
-    able = ["modelica"] if all(part.remembered for part in every if not part.sampled) else []
-    refuse([part for part in every if not part.sampled], "c", able)
-    slip = [part for part in every if part.slips]
-    rest = [part for part in every if not part.slips]
+    taken, missing = divided(model), unwritten(model)
+    written = [row for row in constants(model) if row[0] in taken.parameters]
     text = "\n".join(
         (
-            _head(model, name),
-            _constants([*constants(model), *levels(model)]),
+            _head(model, name, missing),
+            _constants([*written, *levels(model)]),
             C.helpers["sign_of"],
-            _friction(model, name, slip),
-            _force(model, name, rest),
+            _friction(model, name, taken.slip),
+            _force(model, name, taken),
             *_stick(model, name),
         )
     )
     unit = dict(model.units)["force"]
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit))
+    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing)
 
 
 def check_name(name: str) -> None:
@@ -47,7 +46,7 @@ def check_name(name: str) -> None:
         raise ValueError(f"{name!r} cannot begin a name in C: use letters, digits and _ (--name).")
 
 
-def _head(model: Model, name: str) -> str:
+def _head(model: Model, name: str, missing: Sequence[str]) -> str:
     force, position = (comment(dict(model.units)[key]) for key in ("force", "position"))
     return f"""/* {name}: the force of an axis, identified by jaxfric.
  *
@@ -55,9 +54,14 @@ def _head(model: Model, name: str) -> str:
  *
  * double {name}_friction(double velocity);
  * double {name}_force(double position, double velocity, double acceleration, double time);
- */
+{lacks(missing)} */
 #include <math.h>
 """
+
+
+def lacks(missing: Sequence[str]) -> str:
+    """Lines of a comment that say what a text leaves out."""
+    return "".join(f" * Left out: {comment(text)}.\n" for text in missing)
 
 
 def comment(unit: str) -> str:
@@ -74,7 +78,7 @@ def _constants(values: Sequence[tuple[str, float, str]]) -> str:
     return "".join(rows)
 
 
-def _friction(model: Model, name: str, slip: list[Part]) -> str:
+def _friction(model: Model, name: str, slip: Sequence[Part]) -> str:
     unit = comment(dict(model.units)["force"])
     return f"""/* Friction in slip, {unit}. At velocity 0, the constant terms alone. */
 double {name}_friction(double velocity)
@@ -88,7 +92,7 @@ double {name}_friction(double velocity)
 """
 
 
-def _force(model: Model, name: str, rest: list[Part]) -> str:
+def _force(model: Model, name: str, taken: Divided) -> str:
     unit = comment(dict(model.units)["force"])
     return f"""/* The force that a motion needs, {unit}: friction and all the other terms. */
 double {name}_force(double position, double velocity, double acceleration, double time)
@@ -96,7 +100,7 @@ double {name}_force(double position, double velocity, double acceleration, doubl
     const double x = position, v = velocity, a = acceleration, t = time;
     double u = {name}_friction(velocity);
 
-{body(rest)}    (void)x, (void)v, (void)a, (void)t;
+{whole(taken)}    (void)x, (void)v, (void)a, (void)t;
     return u;
 }}
 """
@@ -120,7 +124,15 @@ double {name}_stick(double applied)
     ]
 
 
-def body(some: list[Part]) -> str:
+def whole(taken: Divided) -> str:
+    """The statements that add to slip friction `u` all else, last what the actuator makes of it."""
+    if not taken.faulty:
+        return body(taken.rest)
+    needed = "    /* What a faultless actuator would have to give. */\n    const double f = u;\n\n"
+    return f"{body(taken.rest)}{needed}{body(taken.faulty)}"
+
+
+def body(some: Sequence[Part]) -> str:
     """The statements that add the force of some summands to `u`."""
     return "".join(f"    /* {part.name} */\n{_statements(lines(C, part))}" for part in some)
 

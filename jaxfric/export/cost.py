@@ -14,7 +14,6 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from ..terms.base import Directional
-from ..terms.presliding import AbstractMemory
 from ..units import VELOCITY
 from .outcome import ForceError
 from .parts import Part, parts
@@ -200,10 +199,3 @@ def _check_range(weight: np.ndarray, *forces: np.ndarray) -> None:
             "Over this range the model's force is not finite, or too large to be squared: give a "
             "range that the machine reaches (--speed, --position)."
         )
-
-
-def burst(model: Model, part: Part) -> float:
-    """The most that a term with a memory gives: its column, z − sign v or a gap's, is below 2."""
-    if not isinstance(part.law, AbstractMemory):
-        return 0.0
-    return float(2 * jnp.sum(jnp.abs(alpha(model, part))))

@@ -11,7 +11,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from ..models import Model
 from . import c
 from .outcome import Exported, ForceError
-from .parts import constants, levels, parts, refuse
+from .parts import constants, divided, levels, unwritten
 from .syntax import C, identifier, literal
 
 SOURCE = "fmu.c"
@@ -22,16 +22,15 @@ OUTPUTS = {"friction": "in slip", "force": "that the motion needs"}
 
 
 def export(model: Model, name: str = "axis") -> Exported:
-    """An FMU with inputs position, velocity, acceleration and outputs friction, force; exact.
+    """An FMU with inputs position, velocity, acceleration and outputs friction, force; exact in
+    what it holds.
 
     The parameters of the model are parameters of the FMU. `text` is its C source, `data` the
-    archive.
+    archive. Terms with memory or channels, and a delay, are left out and named.
 
-    **Raises:** `ValueError` for a name that is none in C, and for terms with memory or channels.
+    **Raises:** `ValueError` for a name that is none in C.
     """
     c.check_name(name)
-    every = parts(model)
-    refuse([part for part in every if not part.sampled], "fmu", [])
     values = _source(model, name)
     guid = "{" + hashlib.sha256(str(sorted(values.items())).encode()).hexdigest()[:32] + "}"
     text = _filled(values | {"guid": guid})
@@ -44,12 +43,13 @@ def export(model: Model, name: str = "axis") -> Exported:
         *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held),
     )
     data = _archive({"modelDescription.xml": description, f"sources/{SOURCE}": text})
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), (), remarks, data=data)
+    missing = unwritten(model)
+    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing, remarks, data=data)
 
 
 def _source(model: Model, name: str) -> dict[str, str]:
     """What the C text of the FMU says of this model."""
-    every, known = parts(model), constants(model)
+    taken, known = divided(model), _held(model)
     first = len(INPUTS) + len(OUTPUTS)
     rows = [
         f"    const double {identifier(key)} = r[{first + i}];\n"
@@ -60,13 +60,20 @@ def _source(model: Model, name: str) -> dict[str, str]:
         "name": name,
         "force": c.comment(dict(model.units)["force"]),
         "position": c.comment(dict(model.units)["position"]),
+        "lacks": c.lacks(unwritten(model)),
         "count": str(len(start)),
         "start": ", ".join(start),
         "helper": C.helpers["sign_of"],
         "parameters": "".join(rows),
-        "friction": c.body([part for part in every if part.slips]),
-        "rest": c.body([part for part in every if not part.slips]),
+        "friction": c.body(taken.slip),
+        "rest": c.whole(taken),
     }
+
+
+def _held(model: Model) -> list[tuple[str, float, str]]:
+    """Name, value and unit of the parameters that the FMU holds."""
+    written = divided(model).parameters
+    return [row for row in constants(model) if row[0] in written]
 
 
 def _filled(values: Mapping[str, str]) -> str:
@@ -130,7 +137,7 @@ def _variables(model: Model) -> list[dict[str, str]]:
             "start": literal(value),
             "description": key,
         }
-        for key, value, unit in constants(model)
+        for key, value, unit in _held(model)
     ]
     return rows
 

@@ -1,11 +1,12 @@
 """Modelica: a block from motion to force, the parameters with their units."""
 
 import re
+from collections.abc import Sequence
 from typing import Any
 
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, levels, lines, parts, refuse
+from .parts import Line, Part, constants, divided, levels, lines, unwritten
 from .syntax import MODELICA, identifier, literal
 
 _KEYWORDS = set(
@@ -15,43 +16,46 @@ _KEYWORDS = set(
     "model not operator or outer output package parameter partial protected public pure record "
     "redeclare replaceable return stream then time true type when while within Real".split()
 )
-_OWN = {"position", "velocity", "acceleration", "friction", "force", "x", "v", "a", "t"}
+_OWN = {"position", "velocity", "acceleration", "friction", "force", *"xvatf"}
 
 
 def export(model: Model, name: str = "axis") -> Exported:
-    """A Modelica block: inputs position, velocity, acceleration; outputs friction, force; exact.
+    """A Modelica block: inputs position, velocity, acceleration; outputs friction, force; exact in
+    what it holds.
 
-    Terms with a memory (Dahl, LuGre) have a state. Expressions stand in `noEvent`, so that a
-    given motion is followed without an event at every reversal.
+    Bristles (Dahl, LuGre) have a state; terms with another memory or channels, and a delay, are
+    left out and named. Expressions stand in `noEvent`, so that a given motion is followed without
+    an event at every reversal.
 
-    **Raises:** `ValueError` for a name that is none in Modelica, and for terms with channels.
+    **Raises:** `ValueError` for a name that is none in Modelica.
     """
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _KEYWORDS | _OWN:
         raise ValueError(f"{name!r} cannot name a block in Modelica: choose another (--name).")
-    every = parts(model)
-    refuse([p for p in every if not (p.sampled or p.remembered)], "modelica", [])
-    states = [part for part in every if part.remembered]
-    slip = [part for part in every if part.slips]
-    rest = [part for part in every if not part.slips and not part.remembered]
+    taken, missing = divided(model, states=True), unwritten(model, "modelica")
+    states, written = taken.states, taken.parameters
+    needed = f"friction + {_sum(_products(taken.rest) + _bristles(states))}"
+    actual = f"f + {_sum(_products(taken.faulty))}" if taken.faulty else needed
     text = (
         f'block {name} "Force of an axis, identified by jaxfric"\n'
-        + "".join(_parameter(*row) for row in constants(model))
+        + "".join(f"  // Left out: {' '.join(text.split())}.\n" for text in missing)
+        + "".join(_parameter(*row) for row in constants(model) if row[0] in written)
         + "".join(_parameter(*row) for row in levels(model))
-        + _signals(model)
+        + _signals(model, ", f" * bool(taken.faulty))
         + "".join(f'  Real {_state(part)} "deflection of the bristle";\n' for part in states)
         + "".join(["initial equation\n"] * bool(states))
         + "".join(f"  {_state(part)} = sign(v);\n" for part in states)
         + "equation\n  x = position;\n  v = velocity;\n  a = acceleration;\n  t = time;\n"
         + "".join(map(_evolution, states))
-        + f"  friction = noEvent({_sum(_products(slip))});\n"
-        + f"  force = noEvent(friction + {_sum(_products(rest) + _bristles(states))});\n"
+        + f"  friction = noEvent({_sum(_products(taken.slip))});\n"
+        + f"  f = noEvent({needed});\n" * bool(taken.faulty)
+        + f"  force = noEvent({actual});\n"
         + f"end {name};\n"
     )
     remarks = (
         "The break-away levels are parameters for a model of sticking: the force that a motion "
         "needs does not depend on them.",
     ) * bool(levels(model))
-    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]), (), remarks)
+    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]), missing, remarks)
 
 
 def _unit(unit: str) -> str:
@@ -65,7 +69,7 @@ def _parameter(name: str, value: float, unit: str) -> str:
     return f'  parameter Real {identifier(name)}{_unit(unit)} = {literal(value)} "{name}";\n'
 
 
-def _signals(model: Model) -> str:
+def _signals(model: Model, more: str) -> str:
     force, position = dict(model.units)["force"], dict(model.units)["position"]
     moving = [("position", ""), ("velocity", "/s"), ("acceleration", "/s2")]
     inputs = [f"  input Real {name}{_unit(position + per)};\n" for name, per in moving]
@@ -73,10 +77,10 @@ def _signals(model: Model) -> str:
         f'  output Real friction{_unit(force)} "in slip";\n',
         f'  output Real force{_unit(force)} "that the motion needs";\n',
     ]
-    return "".join([*inputs, *outputs]) + "protected\n  Real x, v, a, t;\n"
+    return "".join([*inputs, *outputs]) + f"protected\n  Real x, v, a, t{more};\n"
 
 
-def _products(some: list[Part]) -> list[str]:
+def _products(some: Sequence[Part]) -> list[str]:
     return [_product(line) for part in some for line in lines(MODELICA, part)]
 
 
@@ -101,7 +105,7 @@ def _evolution(part: Part) -> str:
     return f"  der({z}) = noEvent(v / {distance} * (1.0 - {z} * sign(v)));\n"
 
 
-def _bristles(states: list[Part]) -> list[str]:
+def _bristles(states: Sequence[Part]) -> list[str]:
     """Each column's weight times z − sign v."""
     products = []
     for part in states:

@@ -8,11 +8,13 @@ import numpy as np
 
 from .. import terms as laws
 from ..models import Model
+from ..terms.actuator import PREDICTED
 from ..terms.base import AbstractTerm, summands
-from ..terms.effects import effect_of
+from ..terms.effects import effect_of, traits
+from ..terms.known import KNOWN
 from ..terms.presliding import AbstractBristle, AbstractMemory
 from ..terms.time import AbstractModulated
-from ..units import spell
+from ..units import FORCE, spell
 from .syntax import C, Syntax, identifier
 
 SAMPLED = {"position", "velocity", "time", "acceleration"}
@@ -53,6 +55,11 @@ class Part(NamedTuple):
         return self.term.coordinates <= SAMPLED and not isinstance(self.law, AbstractMemory)
 
     @property
+    def faulty(self) -> bool:
+        """Whether it is what an actuator makes of the force that all the others need."""
+        return PREDICTED in self.term.coordinates
+
+    @property
     def remembered(self) -> bool:
         """Whether it is a bristle, whose state follows one differential equation."""
         return isinstance(self.term, AbstractBristle)
@@ -67,6 +74,55 @@ class Line(NamedTuple):
     parameter: str
     column: str
     side: str = ""
+
+
+class Divided(NamedTuple):
+    """The parts of a model by their place in a text.
+
+    `slip` friction; the `rest`; what is `faulty`, a function of the sum of these; and what the text
+    leaves out, `left`. `states`: bristles, where the language has differential equations.
+    """
+
+    slip: tuple[Part, ...]
+    rest: tuple[Part, ...]
+    states: tuple[Part, ...]
+    faulty: tuple[Part, ...]
+    left: tuple[Part, ...]
+
+    @property
+    def parameters(self) -> frozenset[str]:
+        """The names of the parameters that the text holds."""
+        held = (*self.slip, *self.rest, *self.states, *self.faulty)
+        return frozenset(name for part in held for name in (*part.affine, *part.nonlinear))
+
+
+def divided(model: Model, states: bool = False) -> Divided:
+    """The parts of a model as a language takes them; `states`, whether it knows bristles.
+
+    Beside a force that is not written, of another simulator, what depends on the whole is not.
+    """
+    every = parts(model)
+    channels = frozenset().union(*(part.term.coordinates for part in every))
+    whole = not any(name.startswith(KNOWN) for name in channels)
+    held = [part for part in every if states and part.remembered]
+    spelled = [p for p in every if (p.sampled or p.faulty and whole) and _spelled(p)]
+    taken = {part.key for part in (*held, *spelled)}
+    return Divided(
+        tuple(part for part in spelled if part.slips),
+        tuple(part for part in spelled if not part.slips and not part.faulty),
+        tuple(held),
+        tuple(part for part in spelled if part.faulty),
+        tuple(part for part in every if part.key not in taken),
+    )
+
+
+def _spelled(part: Part) -> bool:
+    """Whether a part has a text, of signals that a function is called with."""
+    try:
+        lines(C, part)
+    except ValueError:
+        return False
+    return part.term.coordinates <= SAMPLED | {PREDICTED}
 
 
 def parts(model: Model) -> tuple[Part, ...]:
@@ -101,7 +157,7 @@ def _shared(terms: Sequence[AbstractTerm], affine, nonlinear):
 
 def _by_law(part: Part) -> tuple[Part, ...]:
     """A sum with directions as directional laws, one part each; another part as it is."""
-    if not isinstance(part.term, laws.Directional):
+    if not isinstance(part.term, laws.Directional) or part.faulty:
         return (part,)
     sides = [summands(part.term.positive), summands(part.term.negative)]
     if [type(term) for term in sides[0]] != [type(term) for term in sides[1]]:
@@ -186,23 +242,41 @@ def levels(model: Model) -> list[tuple[str, float, str]]:
     ]
 
 
-def refuse(wrong: Sequence[Part], target: str, able: Sequence[str], simpler: str = "") -> None:
-    """Raise `ValueError` that names the parts and who can take them; nothing for no part."""
-    if not wrong:
-        return
-    names = ", ".join(dict.fromkeys(part.name for part in wrong))
-    others = f"{' and '.join(able)} can" if able else "no target can"
-    raise ValueError(
-        f"{target} cannot express {names}: {_reason(wrong)}. {others}; mujoco and urdf leave it "
-        f"out and say what that costs.{simpler}"
-    )
-
-
-def _reason(wrong: Sequence[Part]) -> str:
-    """What the first kind of obstacle is."""
-    if any(isinstance(part.law, AbstractMemory) for part in wrong):
-        return "it has a memory, and a function of the present motion has none"
-    channels = sorted(set().union(*(part.term.coordinates for part in wrong)) - SAMPLED)
+def left_out(model: Model, part: Part) -> str:
+    """Why a text holds a part not, and what to do instead."""
+    units, values = dict(model.units), model.parameters
+    if any(name.startswith(KNOWN) for name in part.term.coordinates):
+        if not part.affine:
+            return "the other simulator's force: add to it what this text computes"
+        return f"the other simulator's {', '.join(part.affine)}: put right there what was found"
+    effect = traits(part.term)
+    if effect.late:
+        exact = "" if effect.shift else ", to first order"
+        time = float(values[part.affine[0]])
+        return f"{part.name}: hand over the motion commanded {time:.4g} s later instead{exact}"
+    if isinstance(part.law, AbstractMemory):
+        most = burst(model, part)
+        size = f"; up to {most:.3g} {units['force']} around a reversal" if most else ""
+        return f"{part.name}: it has a memory, and a function of the present motion has none{size}"
+    channels = sorted(part.term.coordinates - SAMPLED - {PREDICTED})
     if channels:
-        return f"it needs {', '.join(channels)}, which the motion does not say"
-    return "it has no form there"
+        return f"{part.name}: it needs {', '.join(channels)}, which the motion does not say"
+    if part.faulty:
+        return f"{part.name}: it depends on the whole force, which is not all here"
+    return f"{part.name}: it has no form there"
+
+
+def burst(model: Model, part: Part) -> float:
+    """The most that a bristle or a gap gives, N: its column, z − sign v or a gap's, is below 2.
+
+    Zero for another part: what a load on a spring gives is the motion's, not the parameters'.
+    """
+    forces = all(p.dimension == FORCE for p in part.term.affine)
+    if not isinstance(part.law, AbstractMemory) or part.term.swings or not forces:
+        return 0.0
+    return 2 * sum(abs(float(model.parameters[name])) for name in part.affine)
+
+
+def unwritten(model: Model, target: str = "c") -> tuple[str, ...]:
+    """What C, Structured Text and an FMU leave out of a model, or Modelica, a line each."""
+    return tuple(left_out(model, part) for part in divided(model, target == "modelica").left)

@@ -9,7 +9,7 @@ from ..units import is_rotary
 from . import cost
 from .cost import Range
 from .outcome import ForceError
-from .parts import SAMPLED, Part, levels, parts
+from .parts import Part, burst, left_out, levels, parts
 
 
 class Joint(NamedTuple):
@@ -59,7 +59,7 @@ def joint(
         sprung += [part for part in parts(model) if part.law.in_joint == "constant"]
     wanted = sum(counted.values(), np.zeros_like(velocity))
     missing = _missing(model, sprung)
-    bursts = sum(cost.burst(model, part) for part in missing)
+    bursts = sum(burst(model, part) for part in missing)
     unit = dict(model.units)["force"]
     return Joint(
         level,
@@ -123,10 +123,10 @@ def _told(model: Model, part: Part, counted, where: cost.Motion, unit: str) -> s
         size = f"{where.rms(force):.3g} {unit} rms, {np.max(np.abs(force)):.3g} {unit} at most"
         taken_up = part.slips and part.law.in_joint != "constant"
         return f"{part.name}: {size}" + ", before the fit takes up what it can" * taken_up
-    if burst := cost.burst(model, part):
-        return f"{part.name}: up to {burst:.3g} {unit} around a reversal, in the worst case only"
-    if channels := sorted(part.term.coordinates - SAMPLED):
-        return f"{part.name}: not counted, for it depends on {', '.join(channels)}"
+    if most := burst(model, part):
+        return f"{part.name}: up to {most:.3g} {unit} around a reversal, in the worst case only"
+    if part.remembered or not part.sampled:
+        return f"{left_out(model, part)} (not counted)"
     if "acceleration" in part.term.coordinates:
         return f"{part.name}: not counted, for it depends on acceleration"
     return f"{part.name}: not counted without the range of the position (--position LOW:HIGH)"

@@ -5,11 +5,12 @@ block gives the break-away force in that direction, while the axis itself still 
 """
 
 import re
+from collections.abc import Sequence
 from itertools import groupby
 
 from ..models import Model
 from .outcome import Exported, ForceError
-from .parts import Line, Part, constants, levels, lines, parts, refuse
+from .parts import Divided, Line, Part, constants, divided, levels, lines, unwritten
 from .syntax import Syntax, identifier, literal
 
 _KEYWORDS = set(
@@ -22,37 +23,38 @@ _KEYWORDS = set(
     "word xor".split()
 )
 _PLAIN = str.maketrans({"·": ".", "²": "2", "³": "3", "⁴": "4", "µ": "u", "°": "deg"})
-_OWN = {"position", "velocity", "acceleration", "elapsed", "friction", "force", "x", "v", "a", "t"}
+_NEEDED = "(* what a faultless actuator would have to give *)\nf := force;"
+_OWN = {"position", "velocity", "acceleration", "elapsed", "friction", "force", *"xvatf"}
 
 
 def export(model: Model, name: str = "axis") -> Exported:
-    """A function block `NAME` with the outputs `friction` and `force`; exact.
+    """A function block `NAME` with the outputs `friction` and `force`; exact in what it holds.
 
-    **Raises:** `ValueError` for a name that is none in Structured Text, and for terms with memory
-    or channels.
+    Terms with memory or channels, and a delay, are left out and named, in the text too.
+
+    **Raises:** `ValueError` for a name that is none in Structured Text.
     """
     if not _fine(name):
         raise ValueError(
             f"{name!r} cannot name a function block: use letters, digits and single _ (--name)."
         )
-    every = parts(model)
-    refuse([part for part in every if not part.sampled], "st", [])
+    taken, missing = divided(model), unwritten(model)
     syntax = _syntax(name)
-    slip = [part for part in every if part.slips]
-    rest = [part for part in every if not part.slips]
     units = {key: _comment(unit) for key, unit in dict(model.units).items()}
     text = "\n".join(
         (
-            _head(name, units),
+            _head(name, units, missing),
             _sign(name),
             f"FUNCTION_BLOCK {name}",
-            _signals(units),
-            _constants(model),
+            _signals(units, ", f" * bool(taken.faulty)),
+            _constants(model, taken),
             "x := position;\nv := velocity;\na := acceleration;\nt := elapsed;",
             "friction := 0.0;",
-            _body(syntax, slip, "friction"),
+            _body(syntax, taken.slip, "friction"),
             "force := friction;",
-            _body(syntax, rest, "force"),
+            _body(syntax, taken.rest, "force"),
+            *[_NEEDED] * bool(taken.faulty),
+            _body(syntax, taken.faulty, "force"),
             "END_FUNCTION_BLOCK\n",
         )
     )
@@ -63,7 +65,7 @@ def export(model: Model, name: str = "axis") -> Exported:
     unit = dict(model.units)["force"]
     held = [f"{name} {value:.4g} {unit}" for name, value, unit in levels(model)]
     remarks = (remark, *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held))
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), (), remarks)
+    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing, remarks)
 
 
 def _fine(name: str) -> bool:
@@ -99,12 +101,13 @@ def _name(parameter: str) -> str:
     return f"p_{plain}" if not _fine(plain) else plain
 
 
-def _head(name: str, units) -> str:
+def _head(name: str, units, missing: Sequence[str]) -> str:
+    lacks = "".join(f"\n   Left out: {_comment(text)}." for text in missing)
     return f"""(* {name}: the feed-forward force of an axis, identified by jaxfric.
 
    IEC 61131-3, no state. Call it each cycle with the commanded motion.
    Units: {units["force"]} (force), {units["position"]} (position), s (time).
-   LREAL throughout; with REAL in its place the error is about one in ten million. *)
+   LREAL throughout; with REAL in its place the error is about one in ten million.{lacks} *)
 """
 
 
@@ -124,7 +127,7 @@ END_FUNCTION
 """
 
 
-def _signals(units) -> str:
+def _signals(units, more: str) -> str:
     force, position = units["force"], units["position"]
     return f"""VAR_INPUT
     position : LREAL; (* commanded, {position} *)
@@ -137,19 +140,20 @@ VAR_OUTPUT
     force : LREAL; (* that the motion needs, friction included, {force} *)
 END_VAR
 VAR
-    x, v, a, t : LREAL;
+    x, v, a, t{more} : LREAL;
 END_VAR"""
 
 
-def _constants(model: Model) -> str:
+def _constants(model: Model, taken: Divided) -> str:
     rows = [
         f"    {_name(name)} : LREAL := {_real(literal(value))}; (* {name}, {_comment(unit)} *)\n"
         for name, value, unit in constants(model)
+        if name in taken.parameters
     ]
     return "VAR CONSTANT\n" + "".join(rows) + "END_VAR"
 
 
-def _body(syntax: Syntax, some: list[Part], result: str) -> str:
+def _body(syntax: Syntax, some: Sequence[Part], result: str) -> str:
     return "".join(
         f"(* {_comment(part.name)} *)\n{_statements(lines(syntax, part), result)}" for part in some
     )
@@ -174,6 +178,6 @@ def _product(line: Line) -> str:
 
 def _word(word: str) -> str:
     """A word of an expression: signals and functions as they are, parameters by their names."""
-    if word in {"x", "v", "a", "t"} or word.isupper() or word.endswith("_SIGN"):
+    if word in {"x", "v", "a", "t", "f"} or word.isupper() or word.endswith("_SIGN"):
         return word
     return word if re.fullmatch(r"e\d*", word) else _name(word)

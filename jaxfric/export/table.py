@@ -13,7 +13,7 @@ from ..units import VELOCITY, spell
 from . import cost
 from .cost import Range
 from .outcome import Exported, ForceError
-from .parts import Part, levels, parts, refuse
+from .parts import Part, left_out, levels, parts
 
 # A Gaussian bump at a fifth of the top speed (the default range) is drawn to 1e-3 of its height.
 POINTS = 201
@@ -30,15 +30,16 @@ def export(
 
     Each coordinate has a column of its own, spaced evenly over its range. A term that depends on
     place and direction is given for positive velocity: it changes its sign with the direction.
-    `force_error` is that of straight lines between the points of friction.
+    `force_error` is that of straight lines between the points of friction. A term that is no
+    function of one coordinate is left out and named.
 
-    **Raises:** `ValueError` for a term that is no function of one coordinate, or whose range is
-    not known.
+    **Raises:** `ValueError` for a term whose range is not known.
     """
     every = [part for part in parts(model) if part.law.in_joint != "inertia"]
-    further = [part for part in every if not part.slips]
-    refuse([p for p in further if not p.sampled], "table", [])
-    refuse([p for p in further if _coordinate(p) is None], "table", ["c and modelica"])
+    beside = [part for part in every if not part.slips]
+    further = [part for part in beside if part.sampled and _coordinate(part) is not None]
+    taken = {part.key for part in further}
+    missing = tuple(left_out(model, part) for part in beside if part.key not in taken)
     known = cost.ranges(model, speed, position)
     columns, force_error = _friction(model, known["velocity"], points)
     columns |= _stick(model, points)
@@ -48,7 +49,7 @@ def export(
     odd = [part.name for part in further if part.term.sided]
     if odd:
         remark.append(f"{', '.join(odd)}: for positive velocity; negative velocity turns the sign.")
-    return Exported(_csv(columns), force_error, (), tuple(remark), known["velocity"])
+    return Exported(_csv(columns), force_error, missing, tuple(remark), known["velocity"])
 
 
 def _stick(model: Model, points: int) -> dict[str, np.ndarray]:

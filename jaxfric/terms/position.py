@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from ..units import FORCE, Dimension
 from .base import AbstractLaw
 from .sample import Parameter, Resolution, Sample
+from .text import literal
 
 POSITION_ONLY = frozenset({"position"})
 WITH_DIRECTION = frozenset({"position", "velocity"})
@@ -72,3 +73,6 @@ class Gravity(AbstractLaw):
 
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.turn)
+
+    def text(self, s):
+        return s.waves("x", literal(self.turn))

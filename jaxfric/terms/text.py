@@ -1,8 +1,9 @@
 """Laws as text: how a language spells arithmetic, and numbers in it.
 
 A law's text is one expression for each column, of the signals `x`, `v`, `a`, `t` (position,
-velocity, acceleration, time). That text and law agree is tested by compiling the one and calling
-the other.
+velocity, acceleration, time), and `f`, the force that the motion needs of a faultless actuator,
+for terms that read the signal `predicted_force`. That text and law agree is tested by compiling the
+one and calling the other.
 """
 
 from collections.abc import Mapping

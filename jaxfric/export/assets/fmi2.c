@@ -2,7 +2,7 @@
  *
  * C99 and a header of FMI 2.0, which the importing tool brings. The model has no state: outputs
  * follow from inputs, parameters and time at once. Units: @force@, @position@, s.
- */
+@lacks@ */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

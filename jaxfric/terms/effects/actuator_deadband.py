@@ -23,6 +23,9 @@ class ActuatorDeadband(AbstractLaw):
     def law(self, sample: Sample):
         return (jnp.sign(reading(sample, PREDICTED)),)
 
+    def text(self, s):
+        return (s.call("sign", "f"),)
+
 
 ACTUATOR_DEADBAND = Effect(
     "actuator_deadband",

@@ -41,6 +41,10 @@ class ActuatorSaturation(AbstractLaw):
         force = reading(sample, PREDICTED)
         return (jnp.sign(force) * jnp.maximum(jnp.abs(force) - self.knee, 0.0),)
 
+    def text(self, s, knee):
+        beyond = s.call("max", f"{s.call('abs', 'f')} - {knee}", "0.0")
+        return (f"{s.call('sign', 'f')} * {beyond}",)
+
 
 ACTUATOR_SATURATION = Effect(
     "actuator_saturation",

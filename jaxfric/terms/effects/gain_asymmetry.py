@@ -23,6 +23,9 @@ class GainAsymmetry(AbstractLaw):
     def law(self, sample: Sample):
         return (jnp.maximum(reading(sample, PREDICTED), 0.0),)
 
+    def text(self, s):
+        return (s.call("max", "f", "0.0"),)
+
 
 GAIN_ASYMMETRY = Effect(
     "gain_asymmetry",

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from ...units import (
     DIMENSIONLESS,
 )
+from ..actuator import PREDICTED
 from ..base import AbstractLaw
 from ..effect import Effect
 from ..sample import Parameter, Sample
@@ -21,7 +22,7 @@ class LoadDependentFriction(AbstractLaw):
     model without this term predicts.
     """
 
-    load: str = eqx.field(static=True, default="predicted_force")
+    load: str = eqx.field(static=True, default=PREDICTED)
     affine: ClassVar = (Parameter("load_friction", DIMENSIONLESS),)
 
     @property
@@ -30,6 +31,11 @@ class LoadDependentFriction(AbstractLaw):
 
     def law(self, sample: Sample):
         return (jnp.abs(reading(sample, self.load)) * jnp.sign(sample.velocity),)
+
+    def text(self, s):
+        if self.load != PREDICTED:
+            return None
+        return (f"{s.call('abs', 'f')} * {s.call('sign', 'v')}",)
 
 
 LOAD_DEPENDENT_FRICTION = Effect(

@@ -15,6 +15,7 @@ from ...units import (
     DIMENSIONLESS,
     TIME,
 )
+from ..actuator import PREDICTED
 from ..base import AbstractLaw, AbstractTerm, Sum, summands, vector
 from ..effect import GRID, Effect, Extent, View, even
 from ..friction import Coulomb
@@ -23,7 +24,7 @@ from ..known import KnownColumns
 from ..position import Gravity
 from ..sample import UNKNOWN, Parameter, Resolution, Sample, Scales
 from ..table import reading
-from ..text import literal
+from ..text import Syntax, literal
 from ..time import AbstractModulated
 
 
@@ -57,9 +58,7 @@ class FrictionStep(AbstractModulated):
         return _stepped(self, time)
 
     def factor_text(self, s, name):
-        if self.ramp == 0:
-            return s.choose(f"t > {name}", "1.0", "0.0")
-        return s.clip(f"(t - {name}) / {literal(self.ramp)} + 0.5", "0.0", "1.0")
+        return _stepped_text(self, s, name)
 
     def extent(self, values):
         at, half = values["step_time"], self.ramp or 1.0
@@ -72,6 +71,13 @@ def _stepped(step, time):
     if not isinstance(step.ramp, jax.Array) and step.ramp == 0:
         return jnp.where(late > 0, jnp.ones_like(late), 0.0)
     return jnp.clip(late / step.ramp + 0.5, 0.0, 1.0)
+
+
+def _stepped_text(step, s: Syntax, name: str) -> str:
+    """The same in a language."""
+    if step.ramp == 0:
+        return s.choose(f"t > {name}", "1.0", "0.0")
+    return s.clip(f"(t - {name}) / {literal(step.ramp)} + 0.5", "0.0", "1.0")
 
 
 class PayloadChange(AbstractTerm):
@@ -102,6 +108,13 @@ class PayloadChange(AbstractTerm):
     @property
     def inertial(self) -> bool:
         return self.load.inertial
+
+    def text(self, s, *names):
+        own = [term.text(s) for term in summands(self.load)]
+        if any(columns is None for columns in own):
+            return None
+        share = _stepped_text(self, s, names[0])
+        return [f"{share} * {column}" for columns in own for column in columns or ()]
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         share, time = _stepped(self, recording.time), recording.time
@@ -135,10 +148,13 @@ class GainStep(AbstractLaw):
     ramp: float = eqx.field(static=True, default=0.0)
     affine: ClassVar = (Parameter("step_gain", DIMENSIONLESS),)
     nonlinear: ClassVar = (FrictionStep.parameter,)
-    coordinates: ClassVar = frozenset({"time", "predicted_force"})
+    coordinates: ClassVar = frozenset({"time", PREDICTED})
 
     def law(self, sample: Sample):
-        return (_stepped(self, sample.time) * reading(sample, "predicted_force"),)
+        return (_stepped(self, sample.time) * reading(sample, PREDICTED),)
+
+    def text(self, s, *names):
+        return (f"{_stepped_text(self, s, names[0])} * f",)
 
 
 # A step in friction cannot be dated better than to about one kernel of the weak form, some
