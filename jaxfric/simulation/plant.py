@@ -63,6 +63,7 @@ class Plant(eqx.Module):
     def step(self, state: tuple[Scalar, Scalar], force: Scalar, span: Scalar, rest: "Surroundings"):
         """Position and velocity after `span` seconds under a constant force.
 
+        `force` may be two, `(2,)`: what arrives where the axis moves forward, and backward.
         Two phases: the second is what is left of the time after a stop in the first. A second
         stop within one step would be chatter, and ends the step at rest.
         """
@@ -73,6 +74,7 @@ class Plant(eqx.Module):
     def _phase(self, x, v, force, span, rest):
         """One midpoint step on one side of zero velocity, ended where the velocity is zero."""
         side, first = self._start(x, v, force, rest)
+        force = self._on_side(force, side, v)
         middle = self._beside(side, v + 0.5 * span * first)
         rate = self._acceleration(x + 0.5 * span * v, middle, force, rest)
         rate = rate if self.smooth is not None else jnp.where(side == 0, 0.0, rate)
@@ -86,17 +88,28 @@ class Plant(eqx.Module):
     def _start(self, x, v, force, rest):
         """Direction of motion, 0 where the axis sticks (Kim, Kim & Ha 2004, eq. 4), and dv/dt."""
         if self.smooth is not None:
-            return jnp.zeros_like(v), self._acceleration(x, v, force, rest)
+            along = self._on_side(force, jnp.zeros_like(v), v)
+            return jnp.zeros_like(v), self._acceleration(x, v, along, rest)
         least = slowest(v.dtype)
         moving, forward, backward = self.resistance(x, jnp.stack([v, least, -least]), rest)
         mass, drift = self.inertia(x, v, rest)
-        free = force - drift
+        ahead, back = jnp.broadcast_to(force, (2,)) - drift
         below, above = self._beyond_slip(v.dtype)
-        up, down = free > forward + above, free < backward + below
+        up, down = ahead > forward + above, back < backward + below
         breaks = jnp.where(up, 1.0, jnp.where(down, -1.0, 0.0))
         side = jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
+        free = self._on_side(force, side, v) - drift
         resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, free))
         return side, (free - jnp.where(v == 0, resting, moving)) / mass
+
+    def _on_side(self, force, side, v):
+        """The force that arrives on a side of zero velocity; both, as they blend."""
+        if jnp.ndim(force) == 0:
+            return force
+        if self.smooth is not None:
+            share = 0.5 * (1 + jnp.tanh(v / self.smooth))
+            return share * force[0] + (1 - share) * force[1]
+        return jnp.where(side < 0, force[1], force[0])
 
     def _beyond_slip(self, dtype):
         """By how much the break-away levels lie beyond the slip curve's ends, N; backwards < 0."""

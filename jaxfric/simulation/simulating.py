@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from .. import signals
 from ..data.recording import Recording, described, require
 from ..models import Model, require as require_model
+from . import actuator as faults
 from .control import AbstractController, Encoder, Feedback
 from .memory import Bristled, holds, lost
 from .plant import Plant, Surroundings, slowest
@@ -49,6 +50,7 @@ class _State(NamedTuple):
     measured: Array
     elapsed: Array
     memory: Any
+    history: Any
 
 
 def simulate(
@@ -74,7 +76,8 @@ def simulate(
 
     - `model`: any [`Model`][jaxfric.models.Model] with inertia, whose terms are functions of one
       sample, or bristles (`Dahl`, `LuGre`, `Model.with_bristles`), whose deflection is a state;
-      units are those of the recording.
+      units are those of the recording. Terms that read `predicted_force` are the actuator between
+      the command and the axis: `force` is the command, and the axis feels what arrives of it.
     - `reference`: a recording, signals of shape `(N,)`. With a `controller`, the set-point is its
       channel `reference`, else its position; the set-point's velocity is the channel
       `reference_velocity`, else the velocity that belongs to the position, else differences.
@@ -101,7 +104,8 @@ def simulate(
     channels, and `reference` in closed loop.
 
     **Raises:** `ValueError` for fewer than two samples, without a set-point or an inertia, for
-    noise without a key, or for a term with a memory of another kind.
+    noise without a key, an actuator that gives next to nothing of its command, or for a term with
+    a memory of another kind.
     """
     _check(model, reference, controller, encoder, force_noise, key)
     _check_memory(model, smooth)
@@ -110,8 +114,10 @@ def simulate(
     force_key, encoder_key = (None, None) if key is None else jax.random.split(key)
     model, controller, encoder = _cast((model, controller, encoder), reference.time.dtype)
     held = _held(reference, controller, encoder, encoder_key, initial)
+    model, actuator = faults.parted(model, _shortest(model, held))
     smooth = None if smooth is None else jnp.asarray(smooth, reference.time.dtype)
-    force, position, velocity = _integrate(model, controller, encoder, held, substeps, smooth)
+    parts = model, actuator, controller, encoder
+    force, position, velocity = _integrate(*parts, held, substeps, smooth)
     if force_key is not None:
         noise = jax.random.normal(force_key, force.shape, force.dtype)
         force = force + jnp.asarray(force_noise, force.dtype) * noise
@@ -148,6 +154,8 @@ def _check(model, reference, controller, encoder, force_noise, key):
             "which its recording did not show. Record motion in both directions, or give them: "
             "model.with_parameters({...})."
         )
+    if not _traced(model):
+        faults.check(model)
     if not _traced((model, reference)) and _massless(model, reference):
         raise ValueError(
             "simulate needs an inertia to accelerate, and the model's is not positive: it has "
@@ -241,13 +249,21 @@ def _set_point(reference, controller, together):
     return goal, _slope(reference.time, goal, together) if velocity is None else velocity
 
 
+def _shortest(model, held: _Held) -> float | None:
+    """The shortest time between two samples, s; `None` inside `jax.jit`."""
+    if _traced((model, held)):
+        return None
+    steps = np.asarray(held.interval)
+    return float(np.min(steps, where=steps > 0, initial=np.max(steps)))
+
+
 @eqx.filter_jit
-def _integrate(model, controller, encoder, held, substeps, smooth):
+def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
     """Force, position and velocity at every sample, each `(N,)`: one scan, compiled once."""
     plant = _plant(model, smooth)
 
     def advance(state, now):
-        fresh = _fresh(plant, controller, encoder, now)
+        fresh = _fresh(plant, actuator, controller, encoder, now)
         state = jax.tree.map(lambda new, old: jnp.where(now.restart, new, old), fresh, state)
         position, velocity = state.motion[:2]
         measured = position if encoder is None else encoder.read(position, now.noise)
@@ -258,15 +274,26 @@ def _integrate(model, controller, encoder, held, substeps, smooth):
             force, memory = controller(memory, Feedback(*seen))
         span, rest = now.interval / substeps, Surroundings(now.time, now.channels)
 
-        def substep(i, motion):
-            clock = rest.at(now.time + span * i.astype(span.dtype))
-            return plant.step(motion, force, span, clock)
+        def substep(i, state):
+            motion, history = state
+            since = span * i.astype(span.dtype)
+            clock, acting = rest.at(now.time + since), force
+            if actuator is not None:
+                acting, history = actuator.acting(history, force, since, span)
+                acting = actuator.arriving(acting, motion[0], clock)
+            return plant.step(motion, acting, span, clock), history
 
-        motion = jax.lax.fori_loop(0, substeps, substep, state.motion, unroll=min(substeps, 2))
-        following = _State(motion, measured, now.interval, memory)
+        history = state.history
+        if actuator is not None:
+            history = actuator.begin(history, now.restart, force, now.interval)
+        moving = state.motion, history
+        motion, history = jax.lax.fori_loop(0, substeps, substep, moving, unroll=min(substeps, 2))
+        if actuator is not None:
+            history = actuator.pass_on(history, force, now.interval)
+        following = _State(motion, measured, now.interval, memory, history)
         return following, (force, measured, velocity)
 
-    first = _fresh(plant, controller, encoder, jax.tree.map(lambda x: x[0], held))
+    first = _fresh(plant, actuator, controller, encoder, jax.tree.map(lambda x: x[0], held))
     return jax.lax.scan(advance, first, held)[1]
 
 
@@ -275,12 +302,13 @@ def _plant(model, smooth):
     return Bristled(model) if holds(model) else Plant(model, smooth)
 
 
-def _fresh(plant, controller, encoder, now):
+def _fresh(plant, actuator, controller, encoder, now):
     """The state at the start of a segment."""
     x, v = now.initial_position, now.initial_velocity
     measured = x if encoder is None else encoder.read(x, now.noise)
     memory = () if controller is None else controller.start()
-    return _State(plant.start(x, v), measured, jnp.zeros_like(x), memory)
+    history = () if actuator is None else actuator.start()
+    return _State(plant.start(x, v), measured, jnp.zeros_like(x), memory, history)
 
 
 def _seen_velocity(state, measured, encoder, now):
@@ -317,7 +345,8 @@ def default_substeps(
 def _rates(model, reference, smooth):
     """Inertia, ∂F/∂v and ∂F/∂x at states of the reference, each `(256, 2 speeds + 1)`."""
     dtype = reference.time.dtype
-    model, smooth = _cast((model, None if smooth is None else jnp.asarray(smooth)), dtype)
+    axis = model.without("predicted_")
+    model, smooth = _cast((axis, None if smooth is None else jnp.asarray(smooth)), dtype)
     bristled = Bristled(model) if holds(model) else None
     plant = Plant(model, smooth) if bristled is None else bristled.still
     together = reference.segment[1:] == reference.segment[:-1]
