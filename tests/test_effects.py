@@ -62,6 +62,8 @@ CASES = {
     "payload": (T.PayloadChange(step_time=3.1), (1.5, 2.0)),
     "payload_ramp": (T.PayloadChange(step_time=3.1, ramp=0.2), (1.5, 2.0)),
     "gain_step": (T.GainStep(6.3, 0.2), (0.2,)),
+    "viscous_step": (T.ParameterStep(T.Viscous(), 6.3), (10.0,)),
+    "inertia_ramp": (T.ParameterStep(T.Inertia(), 3.1, 0.2), (1.5,)),
     "friction_ramp": (T.FrictionStep(T.Viscous(), 6.3, 0.2), (10.0,)),
     "load_drift": (T.LoadDrift(0.0, 12.0, 3), (1.5, -1.0, 0.7)),
     "tone": (T.PeriodicDisturbance(3.7), (0.7, 0.9)),
@@ -597,7 +599,7 @@ def test_the_catalogue_holds_together():
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance transport_delay actuator_lag actuator_deadband actuator_saturation "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
-        "periodic_disturbance disturbance_pulses cross_axis"
+        "periodic_disturbance disturbance_pulses cross_axis parameter_step"
     )
     assert set(effects.EFFECTS) == set(reference_names.split())
     for effect in effects.EFFECTS.values():

@@ -43,6 +43,7 @@ from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effects import EFFECTS, disturbance_pulses
+from jaxfric.terms.sample import Scales
 
 TIME = np.arange(16384) / 1000.0
 COULOMB = 20.0
@@ -105,6 +106,7 @@ CASES = {
     "spring": (terms.Spring(), (60.0,), ()),
     "sticky_spot": (terms.StickySpot(), (6.0,), (0.02, 0.005)),
     "friction_step": (terms.FrictionStep(), (3.0,), (9.0,)),
+    "parameter_step": (terms.ParameterStep(), (25.0,), (9.0,)),
     "periodic_disturbance": (terms.PeriodicDisturbance(), (2.0, -1.0), (6.3,)),
     "frictional_lag": (terms.FrictionalLag(poles=1), (6.0,), (0.03, 0.06)),
 }
@@ -414,6 +416,43 @@ def test_numbers_of_the_recording_are_data_of_a_compiled_term(make, beta, health
         expected = term.with_beta(jnp.asarray(beta)).columns(motion).T
         np.testing.assert_allclose(plain[1], expected, rtol=1e-12, atol=1e-12)
     assert len(traced) == 1
+
+
+@pytest.mark.parametrize(
+    "term",
+    [
+        terms.FrictionStep(ramp=0.1), terms.ParameterStep(ramp=0.1), terms.PayloadChange(ramp=0.1),
+        terms.ParameterStep(terms.Offset()),
+    ],
+)  # fmt: skip
+def test_what_comes_and_goes_has_the_columns_of_its_law(term, healthy):
+    """On the host, from columns that are computed once, as by the law itself."""
+    seen = evidence.gather(healthy[0])
+    betas = np.linspace(1.0, 11.0, 9)[:, None]
+    found = seen.columns(term, betas)
+    for beta, rows in zip(betas[::4], found[::4], strict=True):
+        plain, momentum = evaluation.evaluate(term, np.stack([beta, beta]), seen.motion)
+        momentum = None if momentum is None else np.asarray(momentum)[0]
+        expected = seen.project(np.asarray(plain)[0], momentum).T
+        np.testing.assert_allclose(rows, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_each_value_of_a_baseline_may_change_at_a_moment():
+    """And none twice: friction, the load and the gain have effects of their own."""
+    step = EFFECTS["parameter_step"]
+    (term,) = step.shapes(Scales(0.01, 0.3, 0.0, 0.2, 20.0, 0.0, 12.0, 1e-3))
+    stepped = lambda base: [type(t.term) for t in step.suited(term, base, None)]  # noqa: E731
+    assert stepped(models.gaussian()) == [terms.Offset, terms.Viscous]
+    base = terms.Inertia() + terms.Coulomb() + terms.Offset() + terms.Spring() + terms.KnownGain()
+    assert stepped(base) == [terms.Offset, terms.Spring]
+    names = ("joint/j/damping", "joint/j/frictionloss", "joint/j/stiffness", "gain",
+             "body/a/mass", "body/a/centre_x", "body/b/mass")  # fmt: skip
+    own = terms.KnownColumns(names, ("",) * 7)
+    found = [t.term for t in step.suited(term, terms.Sum((terms.KnownForce(), own)), None)]
+    assert found[:2] == [terms.Offset(), terms.Viscous()]
+    assert [t.names for t in found[2:]] == [("joint/j/stiffness",), ("body/a/mass",)]
+    (carried,) = EFFECTS["payload_change"].suited(terms.PayloadChange(), own, None)
+    assert carried.load.names == ("body/b/mass",) and carried.load.first == 6
 
 
 def test_the_map_shows_what_is_in_step_with_acceleration(healthy):

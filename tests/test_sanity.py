@@ -211,8 +211,12 @@ def test_a_payload_picked_up_is_mass_of_the_last_body_from_its_moment_on(motion)
     carried = force + np.where(time[:, None] > 6, more[1] - more[0], 0)
     found = explain(parts(time, position, carried)[1].recording, Mujoco(ARM, "elbow"))
     (finding,) = found.findings
-    assert finding.effect == "payload_change" and "the mass of body forearm" in finding.sentence
+    assert finding.effect == "payload_change" and finding.attribute == "body/forearm/mass"
+    assert "body forearm's mass changes from 1.2 to 1.8" in finding.sentence
+    assert "something was picked up" in finding.sentence
     moment, mass = (finding.parameters[n] for n in ("step_time", "payload_body/forearm/mass"))
+    moved = finding.parameters["body/forearm/mass"]
+    assert moved.before == 1.2 and float(moved.value) == pytest.approx(1.8, abs=0.02)
     assert float(moment.value) == pytest.approx(6.0, abs=0.2)
     assert float(mass.value) == pytest.approx(0.6, abs=0.02)
 

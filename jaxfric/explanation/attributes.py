@@ -7,6 +7,7 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..simulators import Attribute
+from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation
 from .finding import Finding, Moved
@@ -25,7 +26,14 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
 
     The model keeps the corrections, which are zero where the simulator is right.
     """
-    findings = [_reworded(f, own) if f.effect == MISMATCH else f for f in told.findings]
+    now = {
+        name: own[name].value + (float(value) if name != GAIN else 0.0)
+        for name, value in told.model.parameters.items()
+        if name in own
+    }
+    findings = [
+        _reworded(f, own) if f.effect == MISMATCH else _stepped(f, own, now) for f in told.findings
+    ]
     values = {
         name: _absolute(estimate, own[name]) if name in own and name != GAIN else estimate
         for name, estimate in told.baseline_parameters.items()
@@ -103,9 +111,55 @@ def _sprung(found: dict[str, Moved], own: Mapping[str, Attribute]) -> dict[str, 
     return others | {name.replace(STIFFNESS, REFERENCE): reference}
 
 
+# What a joint calls the parameters of laws that may change at a moment.
+OF_LAW = {"viscous": "damping", "coulomb": "frictionloss", "inertia": "armature"}
+
+
+def _stepped(finding: Finding, own: Mapping[str, Attribute], now: Mapping[str, float]) -> Finding:
+    """The change of an attribute at a moment: "joint elbow's damping changes from 0.5 to 1.1".
+
+    **Arguments:** `now`, the values of the attributes with what is wrong of them put right.
+    """
+    moment = EFFECTS[finding.effect].moment
+    changed = {n: e for n, e in finding.parameters.items() if n != moment}
+    if not moment or len(changed) != 1:
+        return finding
+    (name, change), moment_ = next(iter(changed.items())), finding.parameters[moment]
+    key = _attribute_of(name, own)
+    if key is None or not isinstance(change, Estimate) or not isinstance(moment_, Estimate):
+        return finding
+    before, attribute = now[key], own[key]
+    moved = Moved(before, np.float64(before + change.value), change.standard_error, attribute.unit)
+    keys = {n: _attribute_of(n, own) or n for others in finding.instead.values() for n in others}
+    instead = {key: tuple(keys.values())} if keys else {}
+    value = quantity(Estimate(moved.value, moved.standard_error, moved.unit), smaller=False)
+    reason = finding.sentence.partition(";")[0].partition(": ")[2]
+    text = (
+        f"At t = {quantity(moment_)} {attribute.owner}'s {attribute.what} changes from "
+        f"{before:.4g} to {value}{_doubt(key, moved, instead, own)}{reason and f': {reason}'}; "
+        f"{finding.share:.0%} of the unexplained force"
+    )
+    if finding.confusable_with:
+        rivals = " or ".join(rival.replace("_", " ") for rival in finding.confusable_with)
+        text += f". This recording cannot tell it from {rivals}"
+    return finding._replace(
+        parameters={**finding.parameters, key: moved}, sentence=f"{text}.", attribute=key,
+        instead=instead,
+    )  # fmt: skip
+
+
+def _attribute_of(name: str, own: Mapping[str, Attribute]) -> str | None:
+    """The attribute that a parameter of a change is, `step_viscous` for instance."""
+    stem = name.partition("_")[2]
+    what = OF_LAW.get(stem, "")
+    ends = (n for n in own if n.startswith("joint/") and n.endswith(f"/{what}"))
+    return stem if stem in own and stem != GAIN else next(ends, None) if what else None
+
+
 def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
     """One wrong value: "joint elbow: damping 0.5 → 1.10 N·m·s/rad ± 0.02 N·m·s/rad"."""
-    said = quantity(Estimate(m.value, m.standard_error, "" if m.unit == "1" else m.unit))
+    value = Estimate(m.value, m.standard_error, "" if m.unit == "1" else m.unit)
+    said = quantity(value, smaller=name == CONSTANT)
     if name == CONSTANT:
         return f"a constant force of {said}, for which it has no attribute"
     if name == GAIN:

@@ -143,7 +143,8 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         for term in effect.shapes(seen.limits):
             if "position" in term.coordinates and "position" not in have:
                 continue
-            found += _placed(effect, effect.suited(term, base, turn), evidence, seen)
+            for suited in effect.suited(term, base, turn):
+                found += _placed(effect, suited, evidence, seen)
     present = {type(t) for t in leaves(base)}
     return [c for c in found if not (set(map(type, leaves(c.term))) <= present)]
 

@@ -75,6 +75,8 @@ class Evidence(NamedTuple):
             # Each by itself: nothing is compiled for the names of a simulator's parameters.
             apart = [self.columns(part, np.zeros((len(betas), 0))) for part in summands(term)]
             return np.concatenate(apart, axis=2)
+        if term.switched is not None:
+            return self._switched(term, betas)
         parts = []
         most = STEPPED if term.stepped else BATCH
         for start in range(0, len(betas), most):
@@ -88,12 +90,36 @@ class Evidence(NamedTuple):
 
     def _known(self, term: KnownColumns) -> np.ndarray:
         """Rows of what a simulator says its parameters add, `(J, p)`."""
+        return self.project(*self._said(term)).T
+
+    def _said(self, term: KnownColumns) -> tuple[np.ndarray, ...]:
+        """Rest and momentum of a simulator's parameters at the nodes, `(p, M)` each."""
         channels = self.motion.channels
-        pairs = term.channels
-        plain, momentum = (
-            np.stack([channels[n] for n in some]) for some in zip(*pairs, strict=True)
-        )
-        return self.project(plain, momentum).T
+        pairs = zip(*term.channels, strict=True)
+        return tuple(np.stack([np.asarray(channels[n]) for n in some]) for some in pairs)
+
+    def _switched(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
+        """Rows of another term that comes and goes: its columns at the nodes are computed once."""
+        pairs = [self._at_nodes(part) for part in summands(term.switched)]
+        plain, momentum = (np.concatenate(some) for some in zip(*pairs, strict=True))
+        time, parts = np.asarray(self.motion.time), []
+        for start in range(0, len(betas), BATCH):
+            share, rate = (
+                each[:, None] for each in term.course(betas[start : start + BATCH], time)
+            )
+            if term.inertial:
+                parts.append(self.project(share * plain - rate * momentum, share * momentum))
+            else:
+                parts.append(self.project(share * plain))
+        return np.concatenate(parts).transpose(0, 2, 1)
+
+    def _at_nodes(self, term: AbstractTerm) -> tuple[np.ndarray, ...]:
+        """Columns and momentum at the nodes, `(p, M)` each, of a term without β."""
+        if isinstance(term, KnownColumns):
+            return self._said(term)
+        plain, momentum = evaluate(term, np.zeros((PAIR, 0)), self.motion)
+        first = np.asarray(plain)[0]
+        return first, np.zeros_like(first) if momentum is None else np.asarray(momentum)[0]
 
     def with_channels(self, **channels: np.ndarray) -> "Evidence":
         """The same with more signals at the nodes, each `(M,)`."""

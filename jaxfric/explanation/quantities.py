@@ -17,12 +17,16 @@ _SMALLER = {
 SMALL = 0.05
 
 
-def quantity(estimate: Estimate) -> str:
-    """A value with its unit and half its 95 % interval: "1.90 N ± 0.20 N"."""
+def quantity(estimate: Estimate, smaller: bool = True) -> str:
+    """A value with its unit and half its 95 % interval: "1.90 N ± 0.20 N".
+
+    `smaller`: in a smaller unit where it is small; not so beside another value.
+    """
     value, error = float(estimate.value), float(estimate.standard_error)
     if math.isinf(error):  # the data cannot see it, and its value is any
         return "an amount that this recording cannot tell"
-    name, scale = _unit(estimate.unit, max(abs(value), 2 * error if error > 0 else 0.0))
+    size = max(abs(value), 2 * error if error > 0 else 0.0)
+    name, scale = _unit(estimate.unit, size if smaller else 1.0)
     value, error = value / scale, error / scale
     unit = f" {name}" if name not in ("", "1") else ""
     if not error > 0:

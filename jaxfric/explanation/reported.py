@@ -13,7 +13,8 @@ from .findings import Findings
 from .improvement import Improved
 from .mismatch import Mismatch
 from .regression import Fit
-from .sentences import changed_sentence, mismatch_sentence, sentence
+from .selection import SelectedTerm
+from .sentences import changed_sentence, mismatch_sentence, sentence, spoken
 from .uncertainty import estimated
 
 # What cannot be told from a force that acts late.
@@ -40,7 +41,8 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         alone.append(share)
         if twins := _twins(findings, number):
             share, held = _shares(_without(findings, twins), first, number)
-        text = sentence(effect.name, parameters, share, selected.rivals, _extent(evidence))
+        rivals = *selected.rivals, *map(spoken, selected.instead)
+        text = sentence(effect.name, parameters, share, rivals, _extent(evidence))
         if selected.rephased:
             text += REPHASED
         if effect.late and evidence.motion.position is None:
@@ -49,9 +51,16 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             Finding(
                 effect.name, effect.equation, text, selected.rivals, effect.separate_by, parameters,
                 share, held, selected.p_value, confirmed=selected.confirmed,
+                instead=_instead(selected),
             )
         )  # fmt: skip
     return result, alone
+
+
+def _instead(selected: SelectedTerm) -> dict[str, tuple[str, ...]]:
+    """To the parameter that changed, others that may have changed instead."""
+    own = selected.trial.candidate.term.affine[0].name
+    return {own: selected.instead} if selected.instead else {}
 
 
 def not_confirmed(better: Improved) -> list[Finding]:

@@ -32,8 +32,8 @@ ALIKE = 0.95
 
 def with_rivals(
     best: Finalist, round_: Contest, current: Fit, evidence
-) -> tuple[Finalist, tuple[str, ...]]:
-    """The best, and the effects that cannot be told from it.
+) -> tuple[Finalist, tuple[str, ...], tuple[str, ...]]:
+    """The best, the effects that cannot be told from it, and of its own effect the parameters.
 
     Of a line in position and one in time, which are the same at constant speed, the one in position
     is selected: a machine has more pitches than clocks.
@@ -42,7 +42,7 @@ def with_rivals(
     force = force - basis @ (basis.T @ force)
     alike = []
     for other in round_.finalists:
-        if other.effect.name == best.effect.name:
+        if other.effect.name == best.effect.name and not _of_another(other, best):
             continue
         theirs = _force(other, evidence)
         theirs = theirs - basis @ (basis.T @ theirs)
@@ -57,14 +57,24 @@ def with_rivals(
         significant = other.p_value <= LEVEL and half
         if same or other.score > best.score - RIVAL or (excused and significant):
             alike.append((other, same))
-    names = [f.effect.name for f, _ in alike]
     own = best.effect.name
+    names = [f.effect.name for f, _ in alike if f.effect.name != own]
+    instead = [_parameter(f) for f, _ in alike if f.effect.name == own]
     twin = [f for f, same in alike if same and _line(f, "position")]
     if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
         best = twin[0]
-        instead = best.effect.name
-        names = [own, *(name for name in names if name != instead)]
-    return best, tuple(dict.fromkeys(names))
+        names = [own, *(name for name in names if name != best.effect.name)]
+    return best, tuple(dict.fromkeys(names)), tuple(dict.fromkeys(instead))
+
+
+def _parameter(finalist: Finalist) -> str:
+    """What its force is proportional to."""
+    return finalist.trial.candidate.term.affine[0].name
+
+
+def _of_another(other: Finalist, best: Finalist) -> bool:
+    """Whether two terms of one effect are of different parameters of the baseline."""
+    return best.effect.by_parameter and _parameter(other) != _parameter(best)
 
 
 def _line(finalist: Finalist, coordinate: str) -> bool:

@@ -15,7 +15,8 @@ class SelectedTerm(NamedTuple):
     """A term that was selected, the effects that it may be as well, and its p-value.
 
     `rephased`: whether on the held-out recording its waves only fit with another phase;
-    `confirmed`: whether that recording confirms it, `None` where it cannot say.
+    `confirmed`: whether that recording confirms it, `None` where it cannot say; `instead`: other
+    parameters that may have changed, where the effect is the change of one.
     """
 
     trial: Trial
@@ -23,6 +24,7 @@ class SelectedTerm(NamedTuple):
     p_value: float
     rephased: bool = False
     confirmed: bool | None = None
+    instead: tuple[str, ...] = ()
 
     @property
     def effect(self) -> Effect:

@@ -1,6 +1,7 @@
 """Findings in plain words."""
 
 import math
+import re
 
 from ..identification.uncertainty import Estimate
 from ..terms.effect import Effect, Extent
@@ -25,7 +26,8 @@ def sentence(
     values = {n: float(estimate.value) for n, estimate in parameters.items()}
     template = effect.variant(values, extent) or effect.sentence or name.replace("_", " ")
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
-    text = template.format_map(_Gaps(words))
+    # Names may be a simulator's, of any characters.
+    text = re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
     text += f"; {share:.0%} of the unexplained force"
     if rivals:
         text += ". This recording cannot tell it from " + " or ".join(
@@ -74,6 +76,11 @@ def _times(factor: float, error: float) -> str:
     return f"the recorded force (the torque constant) is {size} times the simulator's"
 
 
+def spoken(name: str) -> str:
+    """The change of a parameter in words: "a step of viscous friction"."""
+    return f"a step of {parameter(name.removeprefix('step_').removesuffix('_sin'))}"
+
+
 _SPOKEN = {
     "coulomb": "Coulomb friction",
     "viscous": "viscous friction",
@@ -115,8 +122,3 @@ def _spoken(name: str) -> str:
         if name.endswith(end):
             return f"the {part} part of {name.removesuffix(end)}"
     return name
-
-
-class _Gaps(dict):
-    def __missing__(self, key):
-        return "an unknown amount"

@@ -44,10 +44,10 @@ def select(problem: Problem, seed: int = 0, in_slip: Selection | None = None) ->
         if best is None or len(selected) >= MOST_TERMS or names in visited:
             break
         visited.add(names)
-        best, rivals = with_rivals(simplest(best, round_), round_, current, evidence)
+        best, rivals, instead = with_rivals(simplest(best, round_), round_, current, evidence)
         current, evidence = _joined(best, current, evidence)
         trial = _with_own_term(best.trial, current)
-        selected = [*selected, SelectedTerm(trial, rivals, best.p_value)]
+        selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
         current, selected = _pruned(evidence, current, selected, round_.size)
         for number in nil(current, len(selected), evidence, problem.wide):
             refused.add(_form(selected[number].trial.candidate))

@@ -21,6 +21,7 @@ from .effects.gravity_unbalance import GravityUnbalance as GravityUnbalance
 from .effects.late import ActuatorLag as ActuatorLag, TransportDelay as TransportDelay
 from .effects.load_dependent_friction import LoadDependentFriction as LoadDependentFriction
 from .effects.load_drift import LoadDrift as LoadDrift
+from .effects.parameter_step import ParameterStep as ParameterStep
 from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturbance
 from .effects.position_dependent_friction import (
     PositionDependentFriction as PositionDependentFriction,

@@ -42,6 +42,17 @@ class AbstractTerm(eqx.Module):
         """How many given numbers of it the residual itself has suggested."""
         return 0
 
+    @property
+    def switched(self) -> "AbstractTerm | None":
+        """The term of which it is `course` times the force; `None` where it is no such term."""
+        return None
+
+    def course(
+        self, betas: Float[np.ndarray, "G d"], time: Float[np.ndarray, " N"]
+    ) -> tuple[Float[np.ndarray, "G N"], Float[np.ndarray, "G N"]]:
+        """The factor of `switched` at each time, s, for many β, on the host, and its rate, 1/s."""
+        raise NotImplementedError
+
     def burden(self, beta: np.ndarray, alpha: np.ndarray) -> Burden | None:
         """What it takes of the machine's inertia and friction; `None` where it is no part of it."""
         return None

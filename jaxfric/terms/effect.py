@@ -118,8 +118,10 @@ def slowly(period: str, text: str) -> Callable[[Mapping[str, float], Extent], st
     return lambda values, extent: text if values[period] * REPEATED > extent.stroke else None
 
 
-def _as_it_is(term: AbstractTerm, base: AbstractTerm, turn: float | None) -> AbstractTerm:
-    return term
+def _as_it_is(
+    term: AbstractTerm, base: AbstractTerm, turn: float | None
+) -> tuple[AbstractTerm, ...]:
+    return (term,)
 
 
 def _no_waves(term: AbstractTerm) -> None:
@@ -143,8 +145,8 @@ class Effect:
     - `name`: its public name. `equation`: as displayed to the user. `family`: of [`FAMILIES`][].
     - `laws`: the terms that model it, each a rival of the others. `scaled`: these from the
       [`Scales`][] of a recording (with values, outside jit), where they are not each law as it is;
-      none where no term can be tried without looking at the residual. `suited`: a term for a
-      baseline, and for a position of which `turn` is one revolution (`None`: no angle).
+      none where no term can be tried without looking at the residual. `suited`: what becomes of a
+      term for a baseline, and for a position of which `turn` is one revolution (`None`: no angle).
 
     Where it shows:
 
@@ -167,6 +169,7 @@ class Effect:
     - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
     - `several`: there may be more than one of it, as of two end stops.
+    - `by_parameter`: its terms are of one parameter of the baseline each, and which, is told.
     - `switches`: its column jumps with the sign of the force, which the command says best.
 
     How it is searched for:
@@ -192,7 +195,7 @@ class Effect:
     sentence: str = ""
     laws: tuple[type[AbstractTerm], ...] = ()
     scaled: Callable[[Scales], tuple[AbstractTerm, ...]] | None = None
-    suited: Callable[[Any, AbstractTerm, float | None], AbstractTerm] = _as_it_is
+    suited: Callable[[Any, AbstractTerm, float | None], tuple[AbstractTerm, ...]] = _as_it_is
     coordinates: tuple[str, ...] = ()
     needs: frozenset[str] = frozenset()
     confusable_with: tuple[str, ...] = ()
@@ -207,6 +210,7 @@ class Effect:
     isolated: bool = False
     ubiquitous: bool = False
     several: bool = False
+    by_parameter: bool = False
     switches: bool = False
     waves: Callable[[Any], Waves | None] = _no_waves
     grid: Callable[[Any, View], np.ndarray] = even

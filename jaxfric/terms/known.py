@@ -83,6 +83,10 @@ class KnownColumns(AbstractLaw):
     spelled: tuple[str, ...] = eqx.field(static=True, converter=tuple)
     first: int = eqx.field(static=True, default=0)
 
+    def only(self, number: int) -> "KnownColumns":
+        """The parameter of that number alone."""
+        return KnownColumns((self.names[number],), (self.spelled[number],), self.first + number)
+
     @property
     def channels(self) -> tuple[tuple[str, str], ...]:
         """The channels of each parameter, the rest and what is differentiated."""

@@ -23,6 +23,8 @@ from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
 # A quarter of the power: what leaves more is not the fault, or not alone.
 LEAVES = 0.25
+# What a clock has to leave of what all other values leave, by itself and beside them.
+HALVED = 0.5
 # Steps below this part of the standard error change nothing.
 ROUNDS, CLOSE = 6, 0.1
 # Further, rad, an angle's sine is no straight line: 5 %.
@@ -53,21 +55,26 @@ class Faults(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Where the search ended: the faults, what can be seen of those that are none, the rows."""
+    """Where the search ended: the faults, what can be seen of those that are none, the rows, and
+    the part of the mismatch that they and the wrong values leave.
+    """
 
     faults: Faults
     values: Mapping[str, tuple[float, float]]
     chosen: tuple[str, ...]
     rows: list[Rows]
+    left: float = 1.0
 
 
 def find(parts: Sequence[Part]) -> Seen:
     """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
-    start = Faults(late=_shift([_rows(part) for part in parts]))
-    seen = _found(parts, start)
-    if start.late and not seen.faults.clock:
-        seen = _found(parts, Faults())
-    return seen
+    seen = _found(parts, Faults())
+    late = _shift([_rows(part) for part in parts])
+    if not late:
+        return seen
+    # The shift knows of few values: of a spring, say, it makes a clock.
+    shifted = _found(parts, Faults(late=late))
+    return shifted if shifted.faults.clock and shifted.left < HALVED * seen.left else seen
 
 
 def _found(parts: Sequence[Part], faults: Faults) -> Seen:
@@ -77,7 +84,7 @@ def _found(parts: Sequence[Part], faults: Faults) -> Seen:
     stack = _stack(parts, rows, faults)
     chosen = _chosen(stack, rows)
     for _ in range(ROUNDS):
-        new = {name for name in chosen if _is_fault(name)}
+        new = _new(stack, chosen)
         if not new - known and known or energy(stack, chosen) > LEAVES * before:
             break
         if not (known := known | new):
@@ -89,11 +96,24 @@ def _found(parts: Sequence[Part], faults: Faults) -> Seen:
     if _energy(rows) > before or not _matters(faults, parts):
         faults, rows = Faults(), [_rows(part) for part in parts]
         stack = _stack(parts, rows, faults)
+    left = energy(stack, chosen) / max(before, 1e-300)
     beside = [name for name in chosen if not _is_fault(name)]
     names = [n for n in stack.names if _is_fault(n) or n.endswith(": gain")]
     beside = list(dict.fromkeys([*beside, OFFSET]))
     each = {n: estimate(stack, [*(b for b in beside if b != n), n])[n] for n in names}
-    return Seen(faults, each, chosen, rows)
+    return Seen(faults, each, chosen, rows, left)
+
+
+def _new(stack: Stack, chosen: Sequence[str]) -> set[str]:
+    """The faults among the columns that were chosen: a clock has to halve what all else leaves.
+
+    A value that changes in the middle looks a little like a clock that drifts.
+    """
+    new = {name for name in chosen if _is_fault(name)}
+    others = [name for name in stack.names if not name.startswith(OFFSET)]
+    if energy(stack, chosen) > HALVED * energy(stack, others):
+        new -= {OFFSET, DRIFT}
+    return new
 
 
 def _refined(
@@ -259,4 +279,4 @@ def _shift(rows: Sequence[Rows]) -> float:
 
     tried = {shift: left(shift) for shift in range(-most, most + 1)}
     best = min(tried, key=lambda shift: tried[shift])
-    return best * step if tried[best] < 0.5 * tried[0] and best > 0 else 0.0
+    return best * step if tried[best] < HALVED * tried[0] and best > 0 else 0.0

@@ -82,10 +82,12 @@ class FrictionalLag(AbstractMemory):
 _COUNTS = (12, 8, 3)
 
 
-def suited(term: FrictionalLag, base: AbstractTerm, turn: float | None) -> AbstractTerm:
+def suited(
+    term: FrictionalLag, base: AbstractTerm, turn: float | None
+) -> tuple[FrictionalLag, ...]:
     """With the kind of bump that the baseline has, or a Gaussian one."""
     own = (leaf for leaf in leaves(base) if isinstance(leaf, AbstractBump))
-    return dataclasses.replace(term, bump=next(own, Gaussian()))
+    return (dataclasses.replace(term, bump=next(own, Gaussian())),)
 
 
 def memories(term: AbstractTerm, view: View) -> np.ndarray:

@@ -1,6 +1,7 @@
 """What changes at one moment: friction, the load, a gain."""
 
 import dataclasses
+from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -60,9 +61,29 @@ class FrictionStep(AbstractModulated):
     def factor_text(self, s, name):
         return _stepped_text(self, s, name)
 
+    @property
+    def switched(self):
+        return None if self.term.nonlinear else self.term
+
+    def course(self, betas, time):
+        return _course(self.ramp, betas, time)
+
     def extent(self, values):
-        at, half = values["step_time"], self.ramp or 1.0
-        return super().extent(values) | {"time": (at - half, at + half)}
+        return super().extent(values) | _about(values["step_time"], self.ramp)
+
+
+def _about(moment: float, ramp: float) -> dict[str, tuple[float, float]]:
+    half = ramp or 1.0
+    return {"time": (moment - half, moment + half)}
+
+
+def _course(ramp: float, betas: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The step and its rate at each time, for the moments in the first column of `betas`."""
+    late = time[None, :] - betas[:, :1]
+    if ramp == 0:
+        return np.where(late > 0, 1.0, 0.0), np.zeros_like(late)
+    inside = np.abs(late) < 0.5 * ramp
+    return np.clip(late / ramp + 0.5, 0.0, 1.0), np.where(inside, 1 / ramp, 0.0)
 
 
 def _stepped(step, time):
@@ -80,53 +101,57 @@ def _stepped_text(step, s: Syntax, name: str) -> str:
     return s.clip(f"(t - {name}) / {literal(step.ramp)} + 0.5", "0.0", "1.0")
 
 
-class PayloadChange(AbstractTerm):
-    """A load that is taken up or put down: F = φ (ΔM a + ΔF), φ(t) = 1(t > t_c).
+class AbstractChange(AbstractTerm):
+    """Terms that begin at one moment: F = φ f, φ(t) = 1(t > t_c), f the force of `changed`.
 
-    It comes and goes with the axis' own speed, so that there is no impulse: φ ΔM a is
-    d/dt(φ ΔM v) − φ̇ ΔM v. `load` holds the laws of what is carried: inertia, and gravity or a
-    constant weight. `step_time` t_c, s; the step is a ramp as in [`FrictionStep`][].
+    Momentum comes and goes with the axis' own speed, so that there is no impulse: φ dp/dt is
+    d/dt(φ p) − φ̇ p. `step_time` t_c, s; the step is a ramp as in [`FrictionStep`][]. A concrete
+    class gives the `prefix` of its affine parameters.
     """
 
-    load: AbstractTerm = Sum((Inertia(), Offset()))
-    step_time: Float[Array, ""] | float = UNKNOWN
-    ramp: float = eqx.field(static=True, default=0.0)
-    parameter: ClassVar = FrictionStep.parameter
+    step_time: eqx.AbstractVar[Float[Array, ""] | float]
+    ramp: eqx.AbstractVar[float]
+    prefix: eqx.AbstractClassVar[str]
+
+    @property
+    @abstractmethod
+    def changed(self) -> AbstractTerm:
+        """The terms that begin."""
 
     @property
     def affine(self):
-        return tuple(p._replace(name=f"payload_{p.name}") for p in self.load.affine)
+        return tuple(p._replace(name=f"{self.prefix}_{p.name}") for p in self.changed.affine)
 
     @property
     def nonlinear(self):
-        return (self.parameter,)
+        return (FrictionStep.parameter,)
 
     @property
     def coordinates(self):
-        return self.load.coordinates | {"time"}
+        return self.changed.coordinates | {"time"}
 
     @property
     def inertial(self) -> bool:
-        return self.load.inertial
+        return self.changed.inertial
 
     def text(self, s, *names):
-        own = [term.text(s) for term in summands(self.load)]
+        own = [term.text(s) for term in summands(self.changed)]
         if any(columns is None for columns in own):
             return None
         share = _stepped_text(self, s, names[0])
-        return [f"{share} * {column}" for columns in own for column in columns or ()]
+        return [f"{share} * ({column})" for columns in own for column in columns or ()]
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         share, time = _stepped(self, recording.time), recording.time
-        plain = share[:, None] * self.load.columns(recording)
+        plain = share[:, None] * self.changed.columns(recording)
         if not isinstance(self.ramp, jax.Array) and self.ramp == 0:
             return plain
         inside = jnp.abs(time - self.step_time) < 0.5 * self.ramp
         rate = jnp.where(inside, 1 / self.ramp, 0.0)
-        return plain - rate[:, None] * self.load.momentum(recording)
+        return plain - rate[:, None] * self.changed.momentum(recording)
 
     def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return _stepped(self, recording.time)[:, None] * self.load.momentum(recording)
+        return _stepped(self, recording.time)[:, None] * self.changed.momentum(recording)
 
     def offset(self, recording: Recording) -> Float[Array, " N"]:
         return jnp.zeros_like(recording.time)
@@ -134,8 +159,35 @@ class PayloadChange(AbstractTerm):
     def beta(self) -> Float[Array, " d"]:
         return vector([self.step_time])
 
-    def with_beta(self, beta: Float[Array, " d"]) -> "PayloadChange":
+    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractChange":
         return eqx.tree_at(lambda term: term.step_time, self, beta[0])
+
+    @property
+    def switched(self) -> AbstractTerm:
+        return self.changed
+
+    def course(self, betas, time):
+        return _course(self.ramp, betas, time)
+
+    def extent(self, values):
+        return self.changed.extent(values) | _about(values["step_time"], self.ramp)
+
+
+class PayloadChange(AbstractChange):
+    """A load that is taken up or put down: F = φ (ΔM a + ΔF), φ(t) = 1(t > t_c).
+
+    `load` holds the laws of what is carried: inertia, and gravity or a constant weight.
+    `step_time` t_c, s; the step is a ramp as in [`FrictionStep`][].
+    """
+
+    load: AbstractTerm = Sum((Inertia(), Offset()))
+    step_time: Float[Array, ""] | float = UNKNOWN
+    ramp: float = eqx.field(static=True, default=0.0)
+    prefix: ClassVar = "payload"
+
+    @property
+    def changed(self) -> AbstractTerm:
+        return self.load
 
 
 class GainStep(AbstractLaw):
@@ -164,7 +216,8 @@ RAMP_SHARE = 0.005
 # stays what it was before these effects.
 
 
-def _ramp(scales: Scales) -> float:
+def ramp(scales: Scales) -> float:
+    """How long a step takes, s, so that its moment can be refined."""
     return RAMP_SHARE * float(scales.duration)
 
 
@@ -179,7 +232,7 @@ FRICTION_STEP = Effect(
     "time",
     "At t = {step_time} Coulomb friction changes by {step_coulomb}",
     laws=(FrictionStep,),
-    scaled=lambda scales: (FrictionStep(Coulomb(), ramp=_ramp(scales)),),
+    scaled=lambda scales: (FrictionStep(Coulomb(), ramp=ramp(scales)),),
     coordinates=("time_by_direction",),
     confusable_with=("thermal_drift",),
     separate_by="Repeat from cold: warming repeats, a step does not.",
@@ -189,19 +242,19 @@ FRICTION_STEP = Effect(
 )
 
 
-def hanging(term: PayloadChange, base: AbstractTerm, turn: float | None) -> AbstractTerm:
+def hanging(
+    term: PayloadChange, base: AbstractTerm, turn: float | None
+) -> tuple[AbstractTerm, ...]:
     """On a turning axis the load's weight goes with the angle; of another simulator's axis it is
-    more mass of the last body, which has the load's place.
+    more mass of the last body, which has the load's place. The weight may rest on something else.
     """
     for part in summands(base):
         masses = [i for i, n in enumerate(getattr(part, "names", ())) if n.endswith("/mass")]
         if isinstance(part, KnownColumns) and masses:
-            last = masses[-1]
-            load = KnownColumns((part.names[last],), (part.spelled[last],), part.first + last)
-            return dataclasses.replace(term, load=load)
-    if turn is None:
-        return term
-    return dataclasses.replace(term, load=Sum((Inertia(), Gravity(turn))))
+            return (dataclasses.replace(term, load=part.only(masses[-1])),)
+    weight = Offset() if turn is None else Gravity(turn)
+    loads = Sum((Inertia(), weight)), Inertia()
+    return tuple(dataclasses.replace(term, load=load) for load in loads)
 
 
 def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
@@ -225,7 +278,7 @@ PAYLOAD_CHANGE = Effect(
     "time",
     "At t = {step_time} the load changes: its inertia by {payload_inertia}",
     laws=(PayloadChange,),
-    scaled=lambda scales: (PayloadChange(ramp=_ramp(scales)),),
+    scaled=lambda scales: (PayloadChange(ramp=ramp(scales)),),
     suited=hanging,
     coordinates=("time",),
     confusable_with=("gain_step", "load_drift", "friction_step"),
@@ -243,7 +296,7 @@ GAIN_STEP = Effect(
     "At t = {step_time} the force needed for the same motion changes by {step_gain} of it: a gain, "
     "a torque constant or a transmission that switched",
     laws=(GainStep,),
-    scaled=lambda scales: (GainStep(ramp=_ramp(scales)),),
+    scaled=lambda scales: (GainStep(ramp=ramp(scales)),),
     coordinates=("predicted_force", "time"),
     needs=frozenset({"predicted_force"}),
     confusable_with=("payload_change", "friction_step"),

@@ -41,7 +41,7 @@ def _draw(effect: Effect, rng: np.random.Generator, n: Nominal, size: float) -> 
     with jax.enable_x64(True):
         limits = _scales(n)
         shapes = effect.shapes(limits)
-        term = effect.suited(shapes[rng.integers(len(shapes))], Gaussian(), None)
+        term = effect.suited(shapes[rng.integers(len(shapes))], Gaussian(), None)[0]
         beta = inside(term, limits, rng.uniform(*SHARES, len(term.nonlinear)))
         term = term.with_beta(jnp.asarray(beta)) if beta.size else term
         sizes = [rms(force) or 1.0 for force in _columns(term, n).T]
