@@ -101,8 +101,10 @@ RECORDINGS = {
     "two_times.csv": (with_head("time,t,position"), "2 columns could be the time"),
     "escape_head.csv": (with_head("time,\x1b[2Jforce2,position"), r"\x1b"),
     "many.csv": (",".join(f"c{i}" for i in range(500)) + "\n" + "1," * 499 + "1\n", "460 more"),
-    "milliseconds.csv": (with_head("time [ms],force,position"), "--scale time=0.001"),
-    "minutes.csv": (with_head("time,force,speed [rpm]"), "--scale velocity"),
+    "minutes.csv": (
+        "time,force,position,speed [rpm]\n" + "".join(f"{line},1\n" for line in LINES),
+        "--scale velocity",
+    ),
     # values
     "no_number.csv": (with_column(1, "nan"), "no_number.csv"),
     "endless.csv": (with_column(1, "inf"), "endless.csv"),

@@ -251,25 +251,60 @@ def test_useless_scales_are_refused(tmp_path, factor):
         io.read(tmp_path / "log.csv", scale={"load": 1.0})
 
 
-def test_milliseconds_need_a_factor(tmp_path):
+def test_milliseconds_in_a_name_are_taken_as_such(tmp_path):
     columns = log()
     named = {"time_ms": 1000 * columns["time"], "x": columns["position"], "f": columns["force"]}
     path = save(tmp_path / "log.csv", named)
-    with pytest.raises(ValueError, match="--scale time=0.001"):
-        io.read(path)
-    np.testing.assert_allclose(io.read(path, scale={"time": 0.001}).time, columns["time"])
+    recording, (said,) = io.read_with_notes(path, served=True)
+    assert "time from time_ms × 0.001" in said
+    np.testing.assert_allclose(recording.time, columns["time"])
+    np.testing.assert_allclose(io.read(path, scale={"time": 1.0}).time, 1000 * columns["time"])
 
 
-def test_velocity_must_be_position_per_second(tmp_path):
+def test_time_stamps_since_1970_are_what_they_are_beside_a_unit(tmp_path):
     columns = log()
-    named = {"t": columns["time"], "x_rad": columns["position"], "v_deg_s": columns["position"]}
+    stamps = 1_700_000_000_000 + np.rint(1000 * columns["time"]).astype(int)
+    named = {"time_ms": stamps, "x": columns["position"], "f": columns["force"]}
+    time = io.read(save(tmp_path / "log.csv", named)).time
+    np.testing.assert_allclose(time, columns["time"] - columns["time"][0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "times", "unit"),
+    [
+        ("x_rad", "v_deg_s", np.pi / 180, "rad"),
+        ("x [deg]", "speed [rpm]", 6.0, "deg"),
+        ("x [rev]", "speed [1/min]", 1 / 60, "rev"),
+        ("x [m]", "speed [mm/s]", 1e-3, "m"),
+        ("x", "speed [mm/min]", 1 / 60, "mm"),
+        (None, "speed [rpm]", np.pi / 30, "rad"),
+        (None, "speed [mm/min]", 1 / 60, "mm"),
+        ("x [mm]", "v [mm/s]", 1.0, "mm"),
+    ],
+)
+def test_velocity_is_the_position_s_unit_per_second(tmp_path, position, velocity, times, unit):
+    columns = log()
+    named = {"t": columns["time"], velocity: columns["position"], "f": columns["force"]}
+    if position:
+        named[position] = columns["force"]
+    recording = io.read(save(tmp_path / "log.csv", named))
+    np.testing.assert_allclose(recording.velocity, times * columns["position"], rtol=1e-12)
+    assert dict(recording.units)["position"] == unit
+    own = io.read(tmp_path / "log.csv", scale={"velocity": 2.0})
+    np.testing.assert_allclose(own.velocity, 2 * columns["position"], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("position", "velocity", "remedy"),
+    [("x", "speed [rpm]", "--units position=rad.*--scale velocity=0.1047"),
+     ("x [mm]", "speed [rpm]", "rpm, but the position is in mm.*--scale velocity=")],
+)  # fmt: skip
+def test_a_speed_that_no_name_relates_asks_for_its_factor(tmp_path, position, velocity, remedy):
+    columns = log()
+    named = {"t": columns["time"], position: columns["position"], velocity: columns["position"]}
     path = save(tmp_path / "log.csv", named | {"f": columns["force"]})
-    with pytest.raises(ValueError, match="deg/s.*rad.*--scale velocity="):
+    with pytest.raises(ValueError, match=remedy):
         io.read(path)
-    assert io.read(path, scale={"velocity": np.pi / 180}).num_samples == 200
-    path = save(tmp_path / "log2.csv", named | {"rpm": columns["force"]})
-    with pytest.raises(ValueError, match="rpm.*--scale velocity=0.1047"):
-        io.read(path, columns={"velocity": "rpm", "force": "x_rad"})
 
 
 # ---- clean-up ----

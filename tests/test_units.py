@@ -116,19 +116,18 @@ def test_a_bracket_that_is_no_unit_passes(column):
 
 
 @pytest.mark.parametrize(
-    ("header", "remedy"),
+    ("header", "said"),
     [
-        ("t [msec],x,f", "--scale time=0.001"),
-        ("time_h,x,f", "--scale time=3600"),
-        ("t,speed [U/min],f", "--scale velocity=0.1047"),
-        ("t,speed [mm/min],f", "--scale velocity=0.016666"),
+        ("t [msec],x,f", "time from t [msec] × 0.001"),
+        ("time_h,x,f", "time from time_h × 3600"),
+        ("t,speed [U/min],f", "velocity from speed [U/min] × 0.10472"),
+        ("t,speed [mm/min],f", "velocity from speed [mm/min] × 0.0166667"),
     ],
 )
-def test_units_that_are_not_per_second_are_refused(tmp_path, header, remedy):
+def test_units_that_are_not_per_second_are_converted_and_said(tmp_path, header, said):
     rows = "".join(f"{i / 100},{i % 7},{i % 3}\n" for i in range(40))
     (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
-    with pytest.raises(ValueError, match=remedy):
-        io.read(tmp_path / "log.csv")
+    assert said in io.read_with_notes(tmp_path / "log.csv", served=True)[1][0]
 
 
 MIXED = {

@@ -39,7 +39,6 @@ _WANTED = frozenset(
 )
 
 _BRACKETS = re.compile(r"[\[({]([^\])}]*)[\])}]")
-_SECONDS = {"ms": "0.001", "µs": "1e-06", "ns": "1e-09", "min": "60", "h": "3600"}
 # What stands in a bracket beside units: which signal it is.
 _REMARK = re.compile(
     r"^(?:|\d+|[a-z]|(?:axis|joint|motor|drive|link)?[ _-]?\w?\d*|(?:low)?[ _-]?(?:pass)?filtered|"
@@ -211,39 +210,6 @@ def _check_needed(chosen: Mapping[str, str], names: list[str], source: str) -> N
         raise ValueError(
             f"{source}: no column is recognised as {' nor as '.join(wanted)}. The columns are: "
             f"{listed(names)}. Name them: --columns {example}.{clock}"
-        )
-
-
-def check_per_second(chosen: Mapping[str, str], scale: Mapping[str, float], source: str) -> None:
-    """Refuse a clock that is not in seconds, and a velocity that is not position per second.
-
-    Only names that state a unit are judged, and a role with a `scale` is the user's own word.
-
-    **Raises:** `ValueError` with the factor to give.
-    """
-    stated = {r: stated_unit(name, r) for r, name in chosen.items() if scale.get(r) is None}
-    time = stated.get("time")
-    if time in _SECONDS:
-        raise ValueError(
-            f"{source}: the column {chosen['time']!r} says that time is in {time}, but time must "
-            f"be in s. Give the factor: --scale time={_SECONDS[time]} (or time=1 if it is in s)."
-        )
-    velocity, position = stated.get("velocity"), stated.get("position")
-    if velocity == "rpm":
-        raise ValueError(
-            f"{source}: the column {chosen['velocity']!r} is in rpm, but velocity must be per "
-            "second. Give the factor: --scale velocity=0.10471975512 for rad/s."
-        )
-    if velocity and velocity.endswith("/min"):
-        raise ValueError(
-            f"{source}: the column {chosen['velocity']!r} is in {velocity}, but velocity must be "
-            "per second. Give the factor: --scale velocity=0.0166666666667 (the rest of the unit "
-            "as it is)."
-        )
-    if velocity and position and velocity != f"{position}/s":
-        raise ValueError(
-            f"{source}: {chosen['velocity']!r} is in {velocity}, but {chosen['position']!r} is in "
-            f"{position}: one of them needs a factor, --scale velocity=FACTOR (or position=)."
         )
 
 

@@ -12,6 +12,7 @@ from . import columns as names, stamps
 from .cleaning import clean
 from .clocked import CLOCK, clocked
 from .delimited import Table, numbers
+from .per_second import per_second
 from .printable import encodable
 from .provenance import sha256
 from .recording import Recording
@@ -110,16 +111,18 @@ def read_with_notes(
     _check_arguments(chosen, scale, units, period, source)
     if counts_per_rev is not None:
         scale, units = angles(chosen, scale, units, counts_per_rev, source)
-    names.check_per_second(chosen, scale, source)
+    implied, units = per_second(chosen, scale, units, source)
     named = names.units(chosen, scale, units)
+    time, counted, in_seconds = _time(table, chosen, scale, path)
+    scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
     notes = [names.served(chosen, scale, named)] if served else []
-    notes += table.notes + names.unknown_units(chosen, scale)
+    notes += table.notes + names.unknown_units(chosen, scale) + counted
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
         for role, name in chosen.items()
         if role not in ("segment", "time")
     }
-    signals = {"time": _time(table, chosen, scale, notes, path)} | signals
+    signals = {"time": time} | signals
     segment = table.columns[chosen["segment"]] if "segment" in chosen else None
     _check_lengths(signals, segment, chosen, source)
     rows = np.arange(table.first_row, len(signals["time"]) + table.first_row, dtype=np.int32)
@@ -165,19 +168,20 @@ def _check_arguments(chosen, scale, units, period, source) -> None:
         )
 
 
-def _time(table: Table, chosen, scale, notes: list[str], path: Path) -> np.ndarray:
-    """The time column, in s unless a scale is given."""
-    column = table.columns[chosen["time"]]
+def _time(table: Table, chosen, scale, path: Path) -> tuple[np.ndarray, list[str], bool]:
+    """The time column, what is said of it, and whether it is in s whatever its name says."""
+    column, notes = table.columns[chosen["time"]], list[str]()
     if (dated := stamps.moments(column)) is not None:
-        return dated
+        return dated, notes, True
+    known = False
     if "time" not in scale:  # a factor is the user's own word
         if column.dtype.kind == "O":
             column = numbers(column, chosen["time"], path, table.first_row)
-        told = len(notes)
         column = stamps.since_1970(column, notes)
-        if len(notes) == told and names.stated_unit(chosen["time"], "time") != "s":
+        known = bool(notes)
+        if not known and names.stated_unit(chosen["time"], "time") is None:
             stamps.check_slow(column, notes)
-    return numbers(column, chosen["time"], path, table.first_row)
+    return numbers(column, chosen["time"], path, table.first_row), notes, known
 
 
 def _check_lengths(signals, segment, chosen, source) -> None:

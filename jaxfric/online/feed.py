@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import signals
 from ..data import columns as names
+from ..data.per_second import per_second
 from ..data.recording import Recording
 
 # Samples that tell the noise, the fastest motion and so the slowest slip.
@@ -80,8 +81,9 @@ class Feed:
         self._delimiter = max(",;\t|", key=head.count)
         header = [cell.strip() for cell in self._split(head)]
         chosen, scale = names.assign(header, columns, source), dict(scale or {})
-        names.check_per_second(chosen, scale, source)
-        self.units = names.units(chosen, scale, units or {})
+        implied, named = per_second(chosen, scale, units or {}, source)
+        self.units = names.units(chosen, scale, named)
+        scale = implied | scale
         self.served = names.served(chosen, scale, self.units)
         self._source, self._width = source, len(header)
         self._index = {

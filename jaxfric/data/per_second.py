@@ -1,0 +1,68 @@
+"""A clock and a velocity that name another unit than seconds, converted."""
+
+import math
+from collections.abc import Mapping
+
+from ..units import factor
+from .columns import stated_unit, units as named_units
+
+_SECONDS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+
+
+def per_second(
+    chosen: Mapping[str, str], scale: Mapping[str, float], units: Mapping[str, str], source: str
+) -> tuple[dict[str, float], dict[str, str]]:
+    """The factors that make time s, and velocity the position's unit per second; and the units.
+
+    Only names that state a unit are judged, and a role with a `scale` is the user's own word. The
+    speed of a turning axis (rpm) without a position is in rad/s then.
+
+    **Arguments:** `chosen`, role to column name; `scale` and `units` as the user gives them.
+
+    **Raises:** `ValueError` where the factor does not follow from the names, with what to give.
+    """
+    stated = {r: stated_unit(name, r) for r, name in chosen.items() if scale.get(r) is None}
+    found, named = {}, dict(units)
+    if (time := stated.get("time")) in _SECONDS:
+        found["time"] = _SECONDS[time]
+    velocity = stated.get("velocity")
+    if velocity is None:
+        return found, named
+    length, seconds = _parts(velocity)
+    wanted = units.get("position") or stated.get("position")
+    if wanted is None and velocity != "rpm":
+        wanted = length
+    elif wanted is None:  # an angle beside a torque is in rad
+        others = {role: name for role, name in chosen.items() if role != "velocity"}
+        known = named_units(others, scale, units).get("position")
+        wanted = known if "position" in chosen else "rad"
+    if wanted is not None and seconds != 1:
+        named["position"] = wanted
+    times = 1.0 if wanted == length else factor(length, wanted or "")
+    if times is None:
+        raise ValueError(_unrelated(chosen, velocity, wanted, source))
+    if times != seconds:
+        found["velocity"] = times / seconds
+    return found, named
+
+
+def _parts(velocity: str) -> tuple[str, float]:
+    """The unit of length or angle in a unit of velocity, and the seconds that it goes by."""
+    if velocity == "rpm":
+        return "rev", 60.0
+    length, _, per = velocity.rpartition("/")
+    return length, 60.0 if per == "min" else 1.0
+
+
+def _unrelated(chosen: Mapping[str, str], velocity: str, wanted: str | None, source: str) -> str:
+    column = f"{source}: the column {chosen['velocity']!r} is in {velocity}"
+    if wanted is None:
+        return (
+            f"{column}, but the unit of {chosen['position']!r} is not known. Name it: --units "
+            f"position=rad (deg, rev); or give the factor: --scale velocity={math.tau / 60:.12g} "
+            "for rad/s."
+        )
+    return (
+        f"{column}, but the position is in {wanted}: one of them needs a factor, --scale "
+        "velocity=FACTOR (or position=)."
+    )
