@@ -1,11 +1,9 @@
-"""Named sums of terms, and a sum with its parameters, which identification returns."""
+"""A sum of terms with its parameters, which identification returns."""
 
 import dataclasses
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache
-from inspect import isabstract
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -14,16 +12,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from . import terms as laws
-from .data.nearest import meant
-from .data.printable import listed, short
-from .data.recording import Recording, described
-from .looks import html, text
-from .looks.text import Block, Table
-from .terms import bristles
-from .terms.base import AbstractTerm, Directional, Sum, summands
-from .terms.effects import law_named
-from .units import DAMPING, SI, STIFFNESS, spell
+from ..data.printable import listed, short
+from ..data.recording import Recording, described
+from ..looks import html, text
+from ..looks.text import Block, Table
+from ..terms import bristles
+from ..terms.base import AbstractTerm, Sum, summands
+from ..units import DAMPING, SI, STIFFNESS, spell
+from . import saved
+from .structures import name_of
 
 SCHEMA = "jaxfric.model/1"
 # Their names and dimensions: force, position, time.
@@ -140,14 +137,14 @@ class Model(eqx.Module):
         """The model as plain data for JSON: structure, parameters with units."""
         dimensions = {p.name: p.dimension for p in (*self.term.affine, *self.term.nonlinear)}
         parameters = {
-            name: {"value": _known(value), "unit": spell(dimensions[name], dict(self.units))}
+            name: {"value": saved.known(value), "unit": spell(dimensions[name], dict(self.units))}
             for name, value in self.parameters.items()
         }
-        structure = {"term": _term_to_dict(self.term), "parameters": parameters}
+        structure = {"term": saved.term_to_dict(self.term), "parameters": parameters}
         document = {"schema": SCHEMA, **structure, "units": dict(self.units)}
         if self.breakaway is not None:
             levels = zip(("backward", "forward"), self.breakaway, strict=True)
-            document["breakaway"] = {way: _known(level) for way, level in levels}
+            document["breakaway"] = {way: saved.known(level) for way, level in levels}
         if self.bristles is not None:
             values = zip(_BRISTLES.items(), self.bristles, strict=True)
             document["bristles"] = {
@@ -164,9 +161,9 @@ class Model(eqx.Module):
             shown = short(repr(schema))
             raise ValueError(f"Not a model document: schema is {shown}, not {SCHEMA!r}.")
         try:
-            term = _term_from_dict(document["term"])
+            term = saved.term_from_dict(document["term"])
             entries = document["parameters"].items()
-            values = {name: _number(name, entry["value"]) for name, entry in entries}
+            values = {name: saved.number(name, entry["value"]) for name, entry in entries}
         except RecursionError as error:
             raise ValueError("The model document is nested deeper than any model.") from error
         except (KeyError, TypeError, AttributeError) as error:
@@ -174,7 +171,7 @@ class Model(eqx.Module):
             raise ValueError(
                 f"The model document is damaged: {shown} is missing or misplaced."
             ) from error
-        model = from_parameters(term, values, _units(document.get("units", {})))
+        model = from_parameters(term, values, saved.units_of(document.get("units", {})))
         model = _with_levels(model, document.get("breakaway"))
         return _with_bristles(model, document.get("bristles"))
 
@@ -229,71 +226,6 @@ def from_parameters(
     return empty.with_parameters(values)
 
 
-def coulomb_viscous() -> Sum:
-    """Inertia, and Coulomb and viscous friction for each direction (Kim, Kim & Ha 2004, eq. 25)."""
-    return laws.Inertia() + Directional(laws.Coulomb() + laws.Viscous())
-
-
-def gaussian() -> Sum:
-    """`coulomb_viscous` with a Gaussian Stribeck bump in each direction (eq. 20)."""
-    return _with_bump(laws.Gaussian())
-
-
-def lorentzian() -> Sum:
-    """`coulomb_viscous` with a Lorentzian Stribeck bump in each direction (eq. 29)."""
-    return _with_bump(laws.Lorentzian())
-
-
-def exponential() -> Sum:
-    """`coulomb_viscous` with an exponential Stribeck bump in each direction (Tustin 1947)."""
-    return _with_bump(laws.Exponential())
-
-
-def generalised() -> Sum:
-    """`coulomb_viscous` with the bump exp(−|v/v_s|^δ) in each direction (Bo & Pavelescu 1982)."""
-    return _with_bump(laws.Generalised())
-
-
-def _with_bump(bump: AbstractTerm) -> Sum:
-    return laws.Inertia() + Directional(laws.Coulomb() + laws.Viscous() + bump)
-
-
-def symmetric(model: Sum) -> Sum:
-    """A model whose two directions share their parameters, with a constant offset beside them."""
-    tied = [t.positive if isinstance(t, Directional) else t for t in model.terms]
-    return Sum(tuple(leaf for t in tied for leaf in summands(t))) + laws.Offset()
-
-
-NAMED: dict[str, Callable[[], Sum]] = {
-    "coulomb-viscous": coulomb_viscous,
-    "gaussian": gaussian,
-    "lorentzian": lorentzian,
-    "exponential": exponential,
-    "generalised": generalised,
-}
-
-
-def name_of(term: AbstractTerm) -> str:
-    """The name of a model, or its terms where it has none."""
-    structure = jax.tree.structure(term)
-    known = (name for name, other in _structures().items() if other == structure)
-    return next(known, None) or _spelled(term)
-
-
-@cache
-def _structures() -> dict[str, Any]:
-    return {name: jax.tree.structure(named(name)) for name in names()}
-
-
-def _spelled(term: AbstractTerm) -> str:
-    if isinstance(term, Sum):
-        return " + ".join(map(_spelled, term.terms))
-    if isinstance(term, Directional):
-        sides = dict.fromkeys(map(_spelled, (term.positive, term.negative)))
-        return f"Directional({', '.join(sides)})"
-    return type(term).__name__
-
-
 def _blocks(model: Model) -> Iterator[Block]:
     """What to say of a model of arrays of numpy: each parameter with its unit; medians of rows."""
     units, term = dict(model.units), model.term
@@ -325,30 +257,6 @@ def require(model: object, verb: str) -> None:
     raise ValueError(f"{verb} needs a Model, not {described(model)}. {hint}")
 
 
-def names() -> tuple[str, ...]:
-    """All model names, the symmetric ones included."""
-    return (*NAMED, *(f"symmetric-{name}" for name in NAMED))
-
-
-def named(name: str) -> Sum:
-    """The model of that name; raises `ValueError`, with the names there are, for another."""
-    known = listed_as(name)
-    stem = known.removeprefix("symmetric-")
-    return symmetric(NAMED[stem]()) if known != stem else NAMED[stem]()
-
-
-def listed_as(name: str) -> str:
-    """A model's name as [`names`][] lists it: also `coulomb_viscous`, as its function is called.
-
-    **Raises:** `ValueError`, with the names there are, for another.
-    """
-    known = name.replace("_", "-")
-    if known not in names():
-        near = meant(name, names())
-        raise ValueError(f"No model is called {name!r}; there are {', '.join(names())}.{near}")
-    return known
-
-
 def load(text: str) -> Model:
     """The model in a JSON text: a model document, or any document with one under `model`.
 
@@ -363,57 +271,13 @@ def load(text: str) -> Model:
     return Model.from_dict(document)
 
 
-def _term_to_dict(term: AbstractTerm) -> dict[str, Any]:
-    """The structure of a term: its class, and every field that is not a nonlinear parameter."""
-    searched = (
-        {p.name for p in term.nonlinear} if not isinstance(term, Sum | Directional) else set()
-    )
-    fields = {
-        f.name: getattr(term, f.name) for f in dataclasses.fields(term) if f.name not in searched
-    }
-    return {"type": type(term).__name__, **{name: _plain(value) for name, value in fields.items()}}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, AbstractTerm):
-        return _term_to_dict(value)
-    if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
-    return value.tolist() if isinstance(value, jax.Array | np.ndarray) else value
-
-
-def _known(value: Any) -> float | None:
-    """A number for JSON; `None` for one that is not known."""
-    return None if np.isnan(value) else float(value)
-
-
-def _is_number(value: Any) -> bool:
-    """Whether a value of a JSON document is a number that a float holds; NaN is one not known."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return not math.isinf(float(value))
-    except OverflowError:
-        return False
-
-
-def _number(name: str, value: Any) -> float:
-    """A parameter's number; NaN where it is not known."""
-    if value is None:
-        return float("nan")
-    if _is_number(value):
-        return float(value)
-    shown = short(repr(value))
-    raise ValueError(f"Parameter {name} of the model document must be a number, not {shown}.")
-
-
 def _with_levels(model: Model, levels: Any) -> Model:
     """The model with the break-away levels of a document, where it has any."""
     if levels is None:
         return model
     if not isinstance(levels, Mapping):
         raise ValueError(f"The model document's breakaway is {short(repr(levels))}, no pair.")
-    pair = [_number(f"breakaway {way}", levels.get(way)) for way in ("backward", "forward")]
+    pair = [saved.number(f"breakaway {way}", levels.get(way)) for way in ("backward", "forward")]
     return model.with_breakaway(*pair)
 
 
@@ -422,86 +286,10 @@ def _with_bristles(model: Model, values: Any) -> Model:
     if values is None:
         return model
     try:
-        pair = [_number(name, values[name]["value"]) for name in _BRISTLES]
+        pair = [saved.number(name, values[name]["value"]) for name in _BRISTLES]
     except (KeyError, TypeError) as error:
         raise ValueError(
             f"The model document's bristles are {short(repr(values))}: stiffness and damping, "
             "each with its value, belong there."
         ) from error
     return model.with_bristles(*pair)
-
-
-def _units(units: Any) -> dict[str, str]:
-    if not isinstance(units, Mapping) or not all(
-        quantity in SI and isinstance(unit, str) and unit.isprintable() and short(unit) == unit
-        for quantity, unit in units.items()
-    ):
-        raise ValueError(
-            "The model document's units must be names of the force and the position unit, not "
-            f"{short(repr(units))}."
-        )
-    return dict(units)
-
-
-def _term_from_dict(document: Mapping[str, Any]) -> AbstractTerm:
-    kind = document["type"]
-    found = getattr(laws, kind, law_named(kind)) if isinstance(kind, str) else None
-    if not (isinstance(found, type) and issubclass(found, AbstractTerm)) or isabstract(found):
-        raise ValueError(
-            f"The model document names a term {short(repr(kind))} that jaxfric.terms does not have."
-        )
-    fields = {name: _revived(value) for name, value in document.items() if name != "type"}
-    if found is Directional:
-        return Directional(_term(fields["positive"]), _term(fields["negative"]))
-    if found is Sum:
-        return Sum(tuple(_term(part) for part in fields["terms"]))
-    for field in dataclasses.fields(found):
-        if field.name in fields:
-            _check_field(f"{kind}.{field.name}", fields[field.name], field.type)
-    return found(**fields)
-
-
-# Nobody identifies so many waves or poles: a larger number is no number of them.
-MOST_COUNTED = 100
-
-
-def _check_field(name: str, value: Any, kind: Any) -> None:
-    """Raise `ValueError` where the field of a term is of another kind than its class says."""
-    if kind is int:
-        right = isinstance(value, int) and _is_number(value) and 0 <= value <= MOST_COUNTED
-    elif kind is float:
-        right = _is_number(value) and not math.isnan(value)
-    elif kind is str:
-        right = isinstance(value, str) and value.isidentifier()
-    elif kind == tuple[float, ...]:
-        for part in value if isinstance(value, tuple) else [None]:
-            _check_field(name, part, float)
-        return
-    elif isinstance(kind, type) and issubclass(kind, AbstractTerm):
-        right = isinstance(value, kind)
-    else:
-        right = not isinstance(value, AbstractTerm)
-    if not right:
-        raise ValueError(
-            f"{name} of the model document is {short(repr(value))}: {_wanted(kind)} belongs there."
-        )
-
-
-def _wanted(kind: Any) -> str:
-    if kind is int:
-        return f"a whole number up to {MOST_COUNTED}"
-    term = isinstance(kind, type) and issubclass(kind, AbstractTerm)
-    return {float: "a finite number", str: "a name"}.get(kind, "a term" if term else "no term")
-
-
-def _term(value: Any) -> AbstractTerm:
-    if not isinstance(value, AbstractTerm):
-        shown = short(repr(value))
-        raise ValueError(f"The model document is damaged: {shown} stands where a term belongs.")
-    return value
-
-
-def _revived(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return _term_from_dict(value)
-    return tuple(_revived(item) for item in value) if isinstance(value, list) else value
