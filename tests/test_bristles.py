@@ -89,12 +89,7 @@ def test_memory_never_drives_the_axis(force):
     assert float(jnp.max(jnp.abs(fast - plain))) < 0.02 * float(jnp.max(jnp.abs(plain)))
 
 
-def test_other_memories_are_refused():
-    model = jf.models.coulomb_viscous() + jf.terms.FrictionalLag()
-    names = [p.name for p in (*model.affine, *model.nonlinear)]
-    lag = jf.models.from_parameters(model, dict.fromkeys(names, 0.01))
-    with pytest.raises(ValueError, match="FrictionalLag"):
-        jf.simulate(lag, pushed())
+def test_smoothing_is_refused():
     with pytest.raises(ValueError, match="smooth"):
         jf.simulate(dahl(15.0), pushed(), smooth=1e-3)
 

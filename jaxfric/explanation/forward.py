@@ -27,8 +27,8 @@ def motion_error(model: Model, recording: Recording) -> float | None:
 
     **Arguments:** `model`; `recording`, signals of shape `(N,)`.
 
-    **Returns:** the relative error of the velocity; `None` where the model cannot run forward,
-    since a term is no function of a single state (presliding, backlash, faults of the actuator).
+    **Returns:** the relative error of the velocity; `None` where a piece that starts anew does not
+    tell the state of a term (presliding, a load on a coupling), or for faults of the actuator.
     """
     beyond = model.term.coordinates - {"position", "velocity", "acceleration", "time"}
     if beyond - set(recording.channels) or not _memoryless(model):

@@ -74,7 +74,7 @@ class Plant(eqx.Module):
     def _phase(self, x, v, force, span, rest):
         """One midpoint step on one side of zero velocity, ended where the velocity is zero."""
         side, first = self._start(x, v, force, rest)
-        force = self._on_side(force, side, v)
+        force = self.on_side(force, side, v)
         middle = self._beside(side, v + 0.5 * span * first)
         rate = self._acceleration(x + 0.5 * span * v, middle, force, rest)
         rate = rate if self.smooth is not None else jnp.where(side == 0, 0.0, rate)
@@ -88,21 +88,21 @@ class Plant(eqx.Module):
     def _start(self, x, v, force, rest):
         """Direction of motion, 0 where the axis sticks (Kim, Kim & Ha 2004, eq. 4), and dv/dt."""
         if self.smooth is not None:
-            along = self._on_side(force, jnp.zeros_like(v), v)
+            along = self.on_side(force, jnp.zeros_like(v), v)
             return jnp.zeros_like(v), self._acceleration(x, v, along, rest)
         least = slowest(v.dtype)
         moving, forward, backward = self.resistance(x, jnp.stack([v, least, -least]), rest)
         mass, drift = self.inertia(x, v, rest)
         ahead, back = jnp.broadcast_to(force, (2,)) - drift
-        below, above = self._beyond_slip(v.dtype)
+        below, above = self.beyond_slip(v.dtype)
         up, down = ahead > forward + above, back < backward + below
         breaks = jnp.where(up, 1.0, jnp.where(down, -1.0, 0.0))
         side = jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
-        free = self._on_side(force, side, v) - drift
+        free = self.on_side(force, side, v) - drift
         resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, free))
         return side, (free - jnp.where(v == 0, resting, moving)) / mass
 
-    def _on_side(self, force, side, v):
+    def on_side(self, force, side, v):
         """The force that arrives on a side of zero velocity; both, as they blend."""
         if jnp.ndim(force) == 0:
             return force
@@ -111,7 +111,7 @@ class Plant(eqx.Module):
             return share * force[0] + (1 - share) * force[1]
         return jnp.where(side < 0, force[1], force[0])
 
-    def _beyond_slip(self, dtype):
+    def beyond_slip(self, dtype):
         """By how much the break-away levels lie beyond the slip curve's ends, N; backwards < 0."""
         if self.model.breakaway is None:
             return jnp.zeros(2, dtype)

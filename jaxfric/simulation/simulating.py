@@ -15,7 +15,7 @@ from ..data.recording import Recording, described, require
 from ..models import Model, require as require_model
 from . import actuator as faults
 from .control import AbstractController, Encoder, Feedback
-from .memory import Bristled, holds, lost
+from .memory import Augmented, holds, lost, shedding
 from .plant import Plant, Surroundings, slowest
 
 # Between two samples the actuator force is constant, so the acceleration changes only as fast as
@@ -75,9 +75,10 @@ def simulate(
     **Arguments:**
 
     - `model`: any [`Model`][jaxfric.models.Model] with inertia, whose terms are functions of one
-      sample, or bristles (`Dahl`, `LuGre`, `Model.with_bristles`), whose deflection is a state;
-      units are those of the recording. Terms that read `predicted_force` are the actuator between
-      the command and the axis: `force` is the command, and the axis feels what arrives of it.
+      sample, or have a memory that is a few states of the axis: bristles, a load on a spring or
+      behind a gap, frictional lag ([`AbstractStates`][jaxfric.terms.AbstractStates]); units are
+      those of the recording. Terms that read `predicted_force` are the actuator between the
+      command and the axis: `force` is the command, and the axis feels what arrives of it.
     - `reference`: a recording, signals of shape `(N,)`. With a `controller`, the set-point is its
       channel `reference`, else its position; the set-point's velocity is the channel
       `reference_velocity`, else the velocity that belongs to the position, else differences.
@@ -104,8 +105,8 @@ def simulate(
     channels, and `reference` in closed loop.
 
     **Raises:** `ValueError` for fewer than two samples, without a set-point or an inertia, for
-    noise without a key, an actuator that gives next to nothing of its command, or for a term with
-    a memory of another kind.
+    noise without a key, an actuator that gives next to nothing of its command, a load that is
+    heavier than the axis, or for a term with a memory of another kind.
     """
     _check(model, reference, controller, encoder, force_noise, key)
     _check_memory(model, smooth)
@@ -159,7 +160,8 @@ def _check(model, reference, controller, encoder, force_noise, key):
     if not _traced((model, reference)) and _massless(model, reference):
         raise ValueError(
             "simulate needs an inertia to accelerate, and the model's is not positive: it has "
-            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass."
+            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass"
+            + (", larger than that of the load on its coupling." if shedding(model) else ".")
         )
     noisy = _positive(force_noise) or (encoder is not None and _positive(encoder.noise))
     if noisy and key is None:
@@ -169,11 +171,15 @@ def _check(model, reference, controller, encoder, force_noise, key):
 def _check_memory(model, smooth):
     if unheld := lost(model):
         raise ValueError(
-            f"simulate holds the memory of bristles (Dahl, LuGre) only, not that of "
-            f"{', '.join(unheld)}. Simulate the model without that term."
+            "simulate holds a memory whose states follow the motion, and "
+            f"{', '.join(unheld)} gives none. Derive it from jaxfric.terms.AbstractStates, or "
+            "simulate without that term."
         )
     if smooth is not None and holds(model):
-        raise ValueError("smooth= blends friction that jumps at rest; bristles have no jump.")
+        raise ValueError(
+            "smooth= blends friction that is a function of the velocity; the model has a memory "
+            "(bristles, a load, a gap or a lag). Leave smooth out."
+        )
 
 
 def _positive(value) -> bool:
@@ -298,8 +304,8 @@ def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
 
 
 def _plant(model, smooth):
-    """The plant of a model: with a state for its bristles where it has any."""
-    return Bristled(model) if holds(model) else Plant(model, smooth)
+    """The plant of a model: with states for its memory where it has any."""
+    return Augmented(model) if holds(model) else Plant(model, smooth)
 
 
 def _fresh(plant, actuator, controller, encoder, now):
@@ -347,8 +353,7 @@ def _rates(model, reference, smooth):
     dtype = reference.time.dtype
     axis = model.without("predicted_")
     model, smooth = _cast((axis, None if smooth is None else jnp.asarray(smooth)), dtype)
-    bristled = Bristled(model) if holds(model) else None
-    plant = Plant(model, smooth) if bristled is None else bristled.still
+    plant = _plant(model, smooth)
     together = reference.segment[1:] == reference.segment[:-1]
     goal, velocity = _set_point(reference, True, together)
     speeds = jnp.nanmax(jnp.abs(velocity)) * jnp.asarray(_SPEEDS, dtype)
@@ -359,7 +364,4 @@ def _rates(model, reference, smooth):
     channels = {name: channel[chosen] for name, channel in reference.channels.items()}
     each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
     surroundings = Surroundings(reference.time[chosen], channels)
-    mass, slopes = jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)
-    if bristled is not None:
-        slopes = (slopes[0], jnp.abs(slopes[1]) + bristled.stiffness())
-    return mass, slopes
+    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)

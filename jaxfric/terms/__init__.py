@@ -63,7 +63,12 @@ from .known import (
     channels_of as channels_of,
 )
 from .position import Gravity as Gravity
-from .presliding import AbstractMemory as AbstractMemory
+from .presliding import (
+    AbstractMemory as AbstractMemory,
+    AbstractStates as AbstractStates,
+    Instant as Instant,
+    States as States,
+)
 from .sample import Parameter as Parameter, Resolution as Resolution, Sample as Sample
 from .table import Table as Table
 from .time import AbstractModulated as AbstractModulated

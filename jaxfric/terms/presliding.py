@@ -1,11 +1,11 @@
 """Friction with a memory: presliding, and friction that lags behind velocity.
 
-A term with a memory is a function of the whole recording, not of a sample. `simulate` holds the
-memory of bristles (Dahl, LuGre), a state that follows the motion; the others cannot stand in it.
+A term with a memory is a function of the whole recording, not of a sample. One whose memory is a
+few states that follow the motion says how they follow it, and `simulate` holds it.
 """
 
 from abc import abstractmethod
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -90,7 +90,74 @@ def bristle(recording: Recording, distance: Float[Array, ""]) -> Float[Array, " 
     return jax.lax.scan(relax, jnp.zeros_like(moved[0]), (keep, goal), unroll=8)[1]
 
 
-class AbstractBristle(AbstractMemory):
+class Instant(NamedTuple):
+    """The motor at one instant: `position`, m, `velocity`, m/s, `side` ±1 or 0 where it sticks.
+
+    `slip` is the velocity kept on its side of zero, where friction that jumps has a value.
+    """
+
+    position: Float[Array, ""]
+    velocity: Float[Array, ""]
+    slip: Float[Array, ""]
+    side: Float[Array, ""]
+
+
+class States(NamedTuple):
+    """States beside position and velocity: `flow` `(k,)` obeys rates, `kept` is set in steps."""
+
+    flow: Float[Array, " k"]
+    kept: Float[Array, "*n"]
+
+
+class AbstractStates(AbstractMemory):
+    """A memory that is a few states of the axis, so that `simulate` holds it.
+
+    With α the force is Σ α_j (`present`_j − `shed`_j dv/dt); `flow` has the derivative `rates`. A
+    step is `ready`, the motion in one direction with `kept` as it is, `settled`.
+    """
+
+    @abstractmethod
+    def start(self, position: Float[Array, ""], velocity: Float[Array, ""]) -> States:
+        """The states at the start of a segment, as along a recording."""
+
+    @abstractmethod
+    def present(self, states: States, now: Instant) -> Float[Array, " p"]:
+        """The columns at one instant, without the part of the acceleration."""
+
+    def rates(self, states: States, now: Instant) -> Float[Array, " k"]:
+        """d(flow)/dt."""
+        return jnp.zeros_like(states.flow)
+
+    def ready(self, states: States, now: Instant, span: Float[Array, ""]) -> States:
+        """The states with `kept` set for the `span`, s, that follows."""
+        return states
+
+    def settled(self, states: States, now: Instant, span: Float[Array, ""]) -> States:
+        """The states after a `span`, s, at the end of which the motor is where `now` says."""
+        return states
+
+    @property
+    def shed(self) -> tuple[Float[Array, ""] | float, ...]:
+        """What each column takes off the motor's inertia."""
+        return (0.0,) * len(self.affine)
+
+    @property
+    def relief(self) -> tuple[Float[Array, ""] | float, ...]:
+        """What each column takes off the friction of a motor near rest at most."""
+        return (0.0,) * len(self.affine)
+
+    @property
+    def stiffness(self) -> tuple[Float[Array, ""] | float, ...]:
+        """How fast each column changes with the motor's position, 1/m times its unit."""
+        return (0.0,) * len(self.affine)
+
+    @property
+    def pace(self) -> Float[Array, ""] | float:
+        """How fast the states change of themselves, 1/s."""
+        return 0.0
+
+
+class AbstractBristle(AbstractStates):
     """A term whose columns are functions of the velocity and of Dahl's deflection z."""
 
     presliding_distance: eqx.AbstractVar[Float[Array, ""] | float]
@@ -106,6 +173,23 @@ class AbstractBristle(AbstractMemory):
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         deflection = bristle(recording, self.presliding_distance)
         return self.lagging(recording.velocity, deflection)
+
+    def start(self, position, velocity) -> States:
+        return States(jnp.sign(velocity)[None], jnp.zeros((0,), velocity.dtype))
+
+    def present(self, states, now):
+        return self.lagging(now.slip[None], states.flow)[0]
+
+    def rates(self, states, now):
+        return now.velocity / self.presliding_distance * (1 - states.flow * now.side)
+
+    @property
+    def relief(self):
+        return (1.0,) * len(self.affine)
+
+    @property
+    def stiffness(self):
+        return (1 / self.presliding_distance,) * len(self.affine)
 
 
 def low_pass(

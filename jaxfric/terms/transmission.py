@@ -1,12 +1,14 @@
 """What lies between motor and load, as far as one mass can tell."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..units import ACCELERATION
-from .presliding import starts
+from .presliding import Instant, States, starts
 from .sample import Parameter, Resolution
 
 
@@ -73,3 +75,64 @@ def pushed(
     push = jax.lax.scan(step, (zero, zero), (span, way, last, speed, begins))[1]
     # Means over the spans before the samples; what is wanted belongs to the samples.
     return 0.5 * (push + jnp.where(jnp.roll(begins, -1), push, jnp.roll(push, -1)))
+
+
+class DryLoad(NamedTuple):
+    """The load of [`pushed`][] as states of the axis, of the same parameters.
+
+    `flow` is (s, w): the way by which the motor is ahead, m, and the load's speed, m/s. `kept` is
+    what holds for a step: the direction of the load's friction, and the flank in touch, 0 for none.
+    """
+
+    omega: Float[Array, ""]
+    damping: Float[Array, ""] | float
+    deceleration: Float[Array, ""]
+    half_gap: Float[Array, ""] | float | None = None
+
+    def start(self, velocity: Float[Array, ""]) -> States:
+        """In slip, wound up by the load's friction."""
+        side = jnp.sign(velocity)
+        gap = 0.0 if self.half_gap is None else self.half_gap
+        wound = side * (gap + self.deceleration / self.omega**2)
+        return States(jnp.stack([wound, velocity]), jnp.stack([side, side]))
+
+    def push(self, states: States, velocity: Float[Array, ""]) -> Float[Array, ""]:
+        """p, m/s²."""
+        ahead, load = states.flow
+        flank = states.kept[1]
+        over = ahead if self.half_gap is None else ahead - flank * self.half_gap
+        push = self.omega**2 * over + 2 * self.damping * self.omega * (velocity - load)
+        if self.half_gap is None:
+            return push
+        return jnp.where(push * flank > 0, push, 0.0)
+
+    def rates(self, states: States, now: Instant) -> Float[Array, " 2"]:
+        """The derivative of `flow`."""
+        side = states.kept[0]
+        slowed = self.push(states, now.velocity) - self.deceleration * side
+        slip = now.velocity - states.flow[1]
+        return jnp.stack([slip, jnp.where(side == 0, 0.0, slowed)])
+
+    def ready(self, states: States, now: Instant) -> States:
+        """With the direction in which the load slips or is about to, and the flank it is at."""
+        ahead, load = states.flow
+        flank = jnp.zeros_like(ahead)
+        if self.half_gap is not None:
+            flank = jnp.where(jnp.abs(ahead) >= self.half_gap, jnp.sign(ahead), 0.0)
+        at = States(states.flow, jnp.stack([flank, flank]))
+        push = self.push(at, now.velocity)
+        breaks = jnp.where(jnp.abs(push) > self.deceleration, jnp.sign(push), 0.0)
+        side = jnp.where(load == 0, breaks, jnp.sign(load))
+        return States(states.flow, jnp.stack([side, flank]))
+
+    def settled(self, states: States) -> States:
+        """A load that would turn back is at rest first; a gap that is crossed ends at its flank."""
+        ahead, load = states.flow
+        side, flank = states.kept
+        load = jnp.where(side * load < 0, 0.0, load)
+        if self.half_gap is not None:
+            # Beyond the flank that it was at, it winds up.
+            above = jnp.where(flank > 0, jnp.maximum(ahead, self.half_gap), self.half_gap)
+            below = jnp.where(flank < 0, jnp.minimum(ahead, -self.half_gap), -self.half_gap)
+            ahead = jnp.clip(ahead, below, above)
+        return States(jnp.stack([ahead, load]), states.kept)

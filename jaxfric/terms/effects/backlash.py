@@ -14,9 +14,9 @@ from ...units import (
 )
 from ..base import AbstractTerm
 from ..effect import Effect, View, even, inside, product
-from ..presliding import AbstractMemory, starts
+from ..presliding import AbstractStates, States, starts
 from ..sample import UNKNOWN, Burden, Parameter
-from ..transmission import DECELERATION, OCTAVES, pushed
+from ..transmission import DECELERATION, OCTAVES, DryLoad, pushed
 from .compliance import coasting
 
 
@@ -46,7 +46,7 @@ def _gap_bounds(scales):
     return scales.slowest * scales.interval, 0.1 * (scales.high - scales.low)
 
 
-class Backlash(AbstractMemory):
+class Backlash(AbstractStates):
     """Load that rests while the motor crosses a gap: u = f − F_L sign(v) (1 − (w/δ)⁸).
 
     w is the place in the gap from −δ to δ (`play`), so the bracket is one inside and zero at
@@ -63,6 +63,39 @@ class Backlash(AbstractMemory):
         inside = 1 - play(recording, self.half_gap) ** 8
         return (-jnp.sign(recording.velocity) * inside)[:, None]
 
+    # As states: the load's position, dragged at the end of a step, and the bracket over the step.
+
+    @property
+    def relief(self):
+        return (1.0,)
+
+    @property
+    def stiffness(self):
+        return (8 / self.half_gap,)
+
+    def start(self, position, velocity) -> States:
+        dragged = position - self.half_gap * jnp.sign(velocity)
+        return States(jnp.zeros((0,), position.dtype), jnp.stack([dragged, 0 * dragged]))
+
+    def present(self, states, now):
+        return -now.side * states.kept[1:]
+
+    def ready(self, states, now, span):
+        load = states.kept[0]
+        place = jnp.clip((now.position - load) / self.half_gap, -1.0, 1.0)
+        # The mean over the way that the motor goes, which may be longer than the gap.
+        way = now.velocity * span / self.half_gap
+        goes = jnp.abs(way) > jnp.sqrt(jnp.finfo(way.dtype).eps)
+        after = jnp.clip(place + way, -1.0, 1.0)
+        crossed = (after - place) - (after**9 - place**9) / 9
+        inside = jnp.where(goes, crossed / jnp.where(goes, way, 1.0), 1 - place**8)
+        return States(states.flow, jnp.stack([load, inside]))
+
+    def settled(self, states, now, span):
+        load, inside = states.kept
+        load = jnp.clip(load, now.position - self.half_gap, now.position + self.half_gap)
+        return States(states.flow, jnp.stack([load, inside]))
+
 
 def _windup_bounds(scales):
     """From what a rigid flank is like to as much as the widest gap."""
@@ -74,7 +107,7 @@ def _windup_bounds(scales):
 _FLANKS = 0.2
 
 
-class ElasticBacklash(AbstractMemory):
+class ElasticBacklash(AbstractStates):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
     F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`pushed`).
@@ -114,6 +147,41 @@ class ElasticBacklash(AbstractMemory):
         omega = jnp.sqrt(self.load_deceleration / self.windup)
         push = pushed(recording, omega, _FLANKS, self.load_deceleration, self.half_gap)
         return (push / self.load_deceleration - jnp.sign(recording.velocity))[:, None]
+
+    @property
+    def _load(self) -> DryLoad:
+        return DryLoad(self.pace, _FLANKS, self.load_deceleration, self.half_gap)
+
+    @property
+    def shed(self):
+        return (1 / self.load_deceleration,)
+
+    @property
+    def relief(self):
+        return (1.0,)
+
+    @property
+    def stiffness(self):
+        return (1 / self.windup,)
+
+    @property
+    def pace(self):
+        return jnp.sqrt(self.load_deceleration / self.windup)
+
+    def start(self, position, velocity) -> States:
+        return self._load.start(velocity)
+
+    def present(self, states, now):
+        return (self._load.push(states, now.velocity) / self.load_deceleration - now.side)[None]
+
+    def rates(self, states, now):
+        return self._load.rates(states, now)
+
+    def ready(self, states, now, span):
+        return self._load.ready(states, now)
+
+    def settled(self, states, now, span):
+        return self._load.settled(states)
 
 
 def gaps(term: AbstractTerm, view: View) -> np.ndarray:

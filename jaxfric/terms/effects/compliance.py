@@ -18,9 +18,9 @@ from ...units import (
 )
 from ..base import AbstractTerm
 from ..effect import GRID, Effect, Extent, View, inside
-from ..presliding import AbstractMemory, starts
+from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, pushed
+from ..transmission import DECELERATION, DryLoad, pushed
 
 
 def _resonance_bounds(scales):
@@ -45,7 +45,7 @@ _RESONANCES = Resolution(0, 12, None, 96)
 _DAMPINGS = Resolution(0, 0.5, None, 4)
 
 
-class Compliance(AbstractMemory):
+class Compliance(AbstractStates):
     """Load on a spring and a damper, position on the motor: u = f + M_L r̈.
 
     With r = x_L − x: r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v). `load_inertia` M_L, kg;
@@ -121,6 +121,39 @@ class Compliance(AbstractMemory):
         rest = jnp.zeros_like(sunk[0])
         return jax.lax.scan(step, (rest, rest), (cosine, sine, sunk, real), unroll=4)[1]
 
+    # As states: of each column r, and dr/dt, or the load's speed dr/dt + v where inertia drives it.
+
+    @property
+    def shed(self):
+        return tuple(float(parameter == _LOAD_INERTIA) for parameter in self.affine)
+
+    @property
+    def relief(self):
+        return tuple(float(parameter == _LOAD_FRICTION) for parameter in self.affine)
+
+    @property
+    def stiffness(self):
+        return tuple(share * self.pace**2 for share in self.shed)
+
+    @property
+    def pace(self):
+        return 2 * jnp.pi * self.load_resonance
+
+    def start(self, position, velocity) -> States:
+        shed, dry = jnp.asarray([self.shed, self.relief], velocity.dtype)
+        flow = jnp.concatenate([-dry * jnp.sign(velocity) / self.pace**2, shed * velocity])
+        return States(flow, jnp.zeros((0,), velocity.dtype))
+
+    def present(self, states: States, now: Instant):
+        return self.rates(states, now)[len(self.affine) :]
+
+    def rates(self, states: States, now: Instant):
+        shed, dry = jnp.asarray([self.shed, self.relief], states.flow.dtype)
+        stretch, speed = jnp.split(states.flow, 2)
+        rate = speed - shed * now.velocity
+        pull = 2 * self.damping_ratio * self.pace * rate + self.pace**2 * stretch
+        return jnp.concatenate([rate, -pull - dry * now.side])
+
 
 _LOAD_INERTIA, _LOAD_FRICTION = (
     Parameter("load_inertia", INERTIA),
@@ -139,7 +172,7 @@ _DRIVES = {
 _DRY = Resolution(0, 4, None, 32)
 
 
-class DryCompliance(AbstractMemory):
+class DryCompliance(AbstractStates):
     """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
 
     M_L p is what the spring pushes the load by (`pushed`): [`Compliance`][] for a load whose
@@ -177,6 +210,42 @@ class DryCompliance(AbstractMemory):
         omega = 2 * jnp.pi * self.load_resonance
         push = pushed(recording, omega, self.damping_ratio, self.load_deceleration)
         return (push - self.load_deceleration * jnp.sign(recording.velocity))[:, None]
+
+    @property
+    def _load(self) -> DryLoad:
+        return DryLoad(self.pace, self.damping_ratio, self.load_deceleration)
+
+    @property
+    def shed(self):
+        return (1.0,)
+
+    @property
+    def relief(self):
+        return (self.load_deceleration,)
+
+    @property
+    def stiffness(self):
+        return (self.pace**2,)
+
+    @property
+    def pace(self):
+        return 2 * jnp.pi * self.load_resonance
+
+    def start(self, position, velocity) -> States:
+        return self._load.start(velocity)
+
+    def present(self, states, now):
+        push = self._load.push(states, now.velocity)
+        return (push - self.load_deceleration * now.side)[None]
+
+    def rates(self, states, now):
+        return self._load.rates(states, now)
+
+    def ready(self, states, now, span):
+        return self._load.ready(states, now)
+
+    def settled(self, states, now, span):
+        return self._load.settled(states)
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.

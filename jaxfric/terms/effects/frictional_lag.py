@@ -15,7 +15,7 @@ from ...units import (
 from ..base import AbstractTerm, joined, leaves, vector
 from ..effect import Effect, View, inside, product
 from ..friction import AbstractBump, Gaussian
-from ..presliding import AbstractMemory, low_pass, starts
+from ..presliding import AbstractStates, Instant, States, low_pass, starts
 from ..sample import UNKNOWN, Burden, Parameter
 
 
@@ -24,7 +24,11 @@ def _memory_bounds(scales):
     return scales.interval, 0.02 * scales.duration
 
 
-class FrictionalLag(AbstractMemory):
+# Knots of the speeds of the past, straight between them: a sixtieth of a dead time apart.
+_PAST = 64
+
+
+class FrictionalLag(AbstractStates):
     """A Stribeck bump late by a dead time or lags: F = F_b sign(v) (g(s) − g(abs v)), s late abs v.
 
     `bump` is g, in the steady state; constant and viscous friction have no memory (Armstrong-
@@ -76,6 +80,52 @@ class FrictionalLag(AbstractMemory):
         for _ in range(self.poles):
             speed = low_pass(speed, steps * self.poles / self.frictional_lag, begins)
         return speed
+
+    # As states: the speed after each pole; of a dead time the late speed, ages and past speeds.
+
+    @property
+    def relief(self):
+        return (1.0,)
+
+    @property
+    def pace(self):
+        return max(self.poles, 1) / self.frictional_lag
+
+    def start(self, position, velocity) -> States:
+        speed = jnp.abs(velocity)
+        if self.poles:
+            return States(speed + jnp.zeros(self.poles, speed.dtype), speed[None][:0])
+        ages = 2 * self.frictional_lag * jnp.linspace(0.0, 1.0, _PAST, dtype=speed.dtype)
+        return States(speed[None][:0], jnp.concatenate([speed[None], ages, speed + 0 * ages]))
+
+    def present(self, states: States, now: Instant):
+        least = jnp.finfo(now.slip.dtype).tiny
+        late = states.flow[-1:] if self.poles else states.kept[:1]
+        change = self.bump.shape(jnp.maximum(late, least))
+        return now.side * (change - self.bump.shape(jnp.maximum(jnp.abs(now.slip), least)))
+
+    def rates(self, states: States, now: Instant):
+        speed = now.side * now.velocity
+        before = jnp.concatenate([speed[None], states.flow])[:-1]
+        return self.pace * (before - states.flow) if self.poles else states.flow
+
+    def ready(self, states: States, now: Instant, span):
+        if self.poles:
+            return states
+        ages, speeds = jnp.split(states.kept[1:], 2)
+        # The speed that is late by τ in the middle of the span.
+        late = jnp.interp(self.frictional_lag - 0.5 * span, ages, speeds)
+        return States(states.flow, states.kept.at[0].set(late))
+
+    def settled(self, states: States, now: Instant, span):
+        if self.poles:
+            return states
+        ages, speeds = jnp.split(states.kept[1:], 2)
+        # The newest knot is replaced until it is far enough from the one before it.
+        full = ages[1] >= self.frictional_lag / (_PAST - 2)
+        ages, speeds = (jnp.where(full, jnp.roll(x, 1), x) for x in (ages + span, speeds))
+        ages, speeds = ages.at[0].set(0.0), speeds.at[0].set(jnp.abs(now.velocity))
+        return States(states.flow, jnp.concatenate([states.kept[:1], ages, speeds]))
 
 
 # Times and widths of a bump that is late (a factor of 1.7 in either changes little), and exponents.
