@@ -172,7 +172,7 @@ MISTAKES = (
     Mistake(_all_motion_in_degrees, "unit", rescaling=True),
     Mistake(_position_alone_in_counts, "unit", velocity=False, rescaling=True),
     Mistake(_force_in_other_units, "unit", rescaling=True),
-    Mistake(_millimetres_stated_beside_metres, "stated unit", velocity=True),
+    Mistake(_millimetres_stated_beside_metres, "stated unit", velocity=True, rescaling=True),
     Mistake(_turns_a_minute_stated, "stated unit", velocity=True),
     Mistake(_other_clock_stated, "stated unit"),
     Mistake(_position_and_velocity_swapped, "column", velocity=True),
