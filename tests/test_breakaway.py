@@ -19,6 +19,7 @@ def axis(levels=None):
     return model if levels is None else model.with_breakaway(*levels)
 
 
+@pytest.mark.slow
 def test_simulation_holds_up_to_the_levels_and_slips_below_them():
     """Eq. (4): a ramp of force through 20 N, where slip begins, and 25 N, where the axis breaks."""
     t = np.arange(3001) / RATE

@@ -51,6 +51,7 @@ def test_the_simulated_motion_is_that_of_another_solver():
     assert np.sqrt(np.mean((np.asarray(run.position) - x) ** 2)) < 0.02 * np.std(x)
 
 
+@pytest.mark.slow
 def test_stiffer_than_the_steps_resolve_it_is_stick_slip():
     """L-stable: at 1e10 N/m, unresolved by far, the motion is that of friction that jumps."""
     axis, clock = jf.scenario.machine(), pushed()
@@ -66,6 +67,7 @@ def dahl(force, distance=1e-4):
     return jf.models.from_parameters(jf.models.coulomb_viscous() + jf.terms.Dahl(), values)
 
 
+@pytest.mark.slow
 def test_a_push_below_break_away_is_held_by_a_spring():
     """Dahl: 5 N move the axis by some of x_d, and nearly back when they are gone."""
     t = np.arange(2000) * STEP
@@ -165,6 +167,7 @@ def test_bristles_are_saved_and_said_at_export():
         axis.with_bristles(-1.0)
 
 
+@pytest.mark.slow
 def test_misuse_is_said(bristled):
     _, log, found = bristled
     with pytest.raises(ValueError, match="batch"):

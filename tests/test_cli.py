@@ -178,6 +178,7 @@ def test_padded_lengths_are_few_and_near(count):
     assert mantissa in (PADDING if count > LONG else (1.0,))
 
 
+@pytest.mark.slow
 def test_the_picture(axis, tmp_path):
     pytest.importorskip("matplotlib")
     assert main(["identify", axis, *MODEL, "--plot", str(tmp_path / "friction.png")]) == 0

@@ -27,6 +27,7 @@ def reference():
     return Recording(time=TIME, force=jnp.zeros_like(TIME), position=GOAL)
 
 
+@pytest.mark.slow
 def test_the_whole_force_goes_with_the_machines_own_model():
     found = benefit(machine(), reference(), LOOP)
     assert found.error_removed > 0.95 and found.force_removed > 0.95

@@ -90,6 +90,7 @@ def test_cost_keeps_its_digits(kind, low, high, offset, beta):
     np.testing.assert_allclose(found, exact(kind, *data, (beta,)), rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*BUMPS, Generalised])
 @pytest.mark.parametrize("count", [2000, 30_000])
 @pytest.mark.parametrize(
@@ -121,6 +122,7 @@ def test_nodes_stand_for_samples(kind, count, low, narrowest):
             )
 
 
+@pytest.mark.slow
 def test_samples_without_weight_do_not_matter():
     speed, sign, force, weight = sample(2000, 1e-3, 0.1, 0.0)
     panels = compress.edges(*map(jnp.asarray, (1e-3, 0.1, 1e-3)))
@@ -145,6 +147,7 @@ def test_a_bump_inside_the_span_gains_nothing():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("points", [1, 7, 64, 130])
 def test_grid_of_any_size_is_the_same_as_point_by_point(points):
     data = sample(500, 1e-3, 0.1, 0.0)

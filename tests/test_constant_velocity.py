@@ -120,6 +120,7 @@ def test_other_terms_are_taken_off_first():
         assert abs(p.force - (10 * np.sign(p.velocity) + 40 * p.velocity)) < 0.5
 
 
+@pytest.mark.slow
 def test_it_is_drawn_and_takes_one_recording_only():
     recording = staircase(bumped)
     found = jf.identify("coulomb-viscous", recording)

@@ -75,6 +75,7 @@ def test_a_stop_is_found_at_its_place_on_its_side(way, unit):
     assert contact.share > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sharp", [False, True])
 @pytest.mark.parametrize(
     "wrong",

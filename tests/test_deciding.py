@@ -43,6 +43,7 @@ def test_a_motion_on_which_two_effects_differ_decides(model):
     )
 
 
+@pytest.mark.slow
 def test_a_motion_on_which_they_are_alike_does_not(model):
     """An unbalance has two parameters more, which is no evidence against it."""
     found = decide(model, "spring", ("gravity_unbalance",), log(0.002, lambda x: STIFFNESS * x, 1))

@@ -118,6 +118,7 @@ def test_jit_and_vmap_change_nothing(term):
     np.testing.assert_allclose(compiled(term, stack(rows)), apart, rtol=1e-12, atol=1e-14)
 
 
+@pytest.mark.slow
 @each_term
 def test_derivative_by_beta_agrees_with_finite_differences(term):
     beta, recording = term.beta(), motion()
@@ -131,12 +132,14 @@ def test_derivative_by_beta_agrees_with_finite_differences(term):
             np.testing.assert_allclose(slopes[..., i], expected, rtol=1e-5, atol=1e-6 * scale)
 
 
+@pytest.mark.slow
 @each_term
 def test_reverse_mode_is_finite(term):
     slope = jax.grad(lambda b: jnp.sum(term.with_beta(b).columns(motion()) ** 2))(term.beta())
     assert bool(jnp.all(jnp.isfinite(slope)))
 
 
+@pytest.mark.slow
 @each_term
 def test_single_precision_stays_single(term):
     with jax.enable_x64(False):
@@ -174,6 +177,7 @@ def test_every_nonlinear_parameter_has_a_compact_set_around_its_value(term):
     assert bool(jnp.all((term.beta() >= lower) & (term.beta() <= upper)))
 
 
+@pytest.mark.slow
 @each_term
 def test_no_term_passes_for_a_function_of_velocity_that_is_none(term):
     """Lemma 1 must not be used where it does not hold: columns at equal velocity must be equal."""
@@ -241,6 +245,7 @@ def column(term, recording, k=0):
     return float(term.columns(recording)[0, k])
 
 
+@pytest.mark.slow
 def test_a_stop_is_met_in_its_own_half_of_the_stroke():
     run = Recording([0.0, 1.0], [0.0, 0.0], [-1.0, 3.0], [1.0, 1.0])
     limits = signals.scales(run)
@@ -388,6 +393,7 @@ def test_a_filtered_speed_does_not_vanish_at_a_reversal():
 
 
 # With little friction a load rattles in its gap without end, and no two solutions agree for long.
+@pytest.mark.slow
 @pytest.mark.parametrize(("gap", "slow"), [(None, 0.6), (0.004, 3.0)])
 def test_a_load_with_dry_friction_moves_as_its_equation_says(gap, slow):
     """The same, stepped twenty times as finely and explicitly."""
@@ -411,6 +417,7 @@ def test_a_load_with_dry_friction_moves_as_its_equation_says(gap, slow):
     assert np.sqrt(np.mean((found - wanted) ** 2)) < 0.02 * np.sqrt(np.mean(wanted**2))
 
 
+@pytest.mark.slow
 def test_a_dry_load_in_slip_swings_as_any_other():
     time = np.arange(3000) / 1000
     speed = 0.3 + 0.1 * np.sin(9 * time)
@@ -461,6 +468,7 @@ def test_a_load_swings_as_its_equation_says(driven):
         T.Compliance(4.0, 0.15, "gravity")
 
 
+@pytest.mark.slow
 def test_a_memory_starts_anew_in_each_segment():
     recording = motion(count=40)
     segment = np.arange(40) // 20
@@ -534,6 +542,7 @@ def planted(healthy, term, alpha, noise=0.5):
     return dataclasses.replace(seen, force=jnp.asarray(force))
 
 
+@pytest.mark.slow
 @each_case
 def test_a_planted_term_comes_back(healthy, term, alpha):
     """Weak form, noisy encoder and force, β known: the term's force to 5 %.

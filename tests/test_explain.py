@@ -264,6 +264,7 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
     assert overlooked(planted(healthy[0], term, alpha, beta)) is None
 
 
+@pytest.mark.slow
 def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -10))
     run = jax.tree.map(lambda x: x[:-12], run)
@@ -340,6 +341,7 @@ def test_what_a_place_beside_the_right_one_leaves_is_no_noise():
     assert 0.9 < scan.gain[scan.best] and hurdle < 0.1  # by what it leaves, 0.22
 
 
+@pytest.mark.slow
 def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
     found = np.array([tones_judged(seed, 20, 0.0) for seed in range(200)])
     assert np.mean(found[:, 0] > significance.MOSTLY) > 0.3
@@ -527,6 +529,7 @@ def test_what_the_motion_has_is_no_tone_but_alone(healthy):
     assert np.any(np.abs(own - 1.03) < 8 * step)
 
 
+@pytest.mark.slow
 def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
     rates, tone = 0.7 * (1 + np.random.default_rng(0).uniform(0, 2.5, 5)), "periodic_disturbance"
 
@@ -578,6 +581,7 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     assert found.selected == []
 
 
+@pytest.mark.slow
 def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     term, alpha, beta = CASES["friction_step"]
     found = explain(planted(healthy[0], term, alpha, beta), "gaussian")
@@ -640,6 +644,7 @@ def finalist(term):
     return types.SimpleNamespace(trial=trial, betas=None, alpha=alpha), np.asarray(term.beta())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("inertia", "is_one"), [(1.0, True), (12.0, False)])
 def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
     run = planted(healthy[0], LOAD, (inertia,))
@@ -649,6 +654,7 @@ def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
     assert physical_constraints.physical(load, posed.base, posed.evidence) is is_one
 
 
+@pytest.mark.slow
 def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     term, trial = terms.ElasticBacklash(), types.SimpleNamespace(threshold=0.1)
@@ -673,6 +679,7 @@ def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
             assert machine.p_value == 0.002 and machine.score > 10
 
 
+@pytest.mark.slow
 def test_what_lags_is_a_curve_that_is_there(healthy):
     lag, beta = finalist(terms.FrictionalLag(0.02, terms.Gaussian(0.05)))
     for name, force, there in (
@@ -770,6 +777,7 @@ def test_the_map_of_a_late_force_is_over_its_rate(healthy):
     assert drawn["unit"] == "N/s"
 
 
+@pytest.mark.slow
 def test_a_moment_counts_on_a_recording_in_which_it_returns(healthy):
     gaussian, step, spot = models.named("gaussian"), CASES["friction_step"], CASES["sticky_spot"]
     known = problem.with_holdout(problem.problem_of(healthy[0], gaussian), healthy[1])

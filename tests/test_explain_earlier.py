@@ -43,6 +43,7 @@ def test_more_coulomb_friction_is_told_with_its_change(healthy):
     assert "What is named accounts for the difference" in found.summary
 
 
+@pytest.mark.slow
 def test_the_same_machine_has_not_changed(healthy):
     found = explain(healthy[1], Earlier(healthy[0]))
     assert found.verdict == "consistent" and not found.findings
@@ -71,6 +72,7 @@ def test_the_sentence_has_both_values_and_the_error_of_the_change():
     assert parameter("inertia") == "inertia" and parameter("coulomb") == "Coulomb friction"
 
 
+@pytest.mark.slow
 def test_the_command_takes_an_earlier_recording(tmp_path, capsys):
     old, new = (write_axis(tmp_path / f"{n}.csv", 4001, seed=i) for i, n in enumerate("ab"))
     out = tmp_path / "changed.json"

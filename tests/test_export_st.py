@@ -65,6 +65,7 @@ def test_a_block_computes_the_library_s_force_and_friction():
 SLOW = pytest.mark.slow
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scale", [1.0, pytest.param(1e-9, marks=SLOW), pytest.param(1e12, marks=SLOW)]
 )

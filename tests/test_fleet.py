@@ -130,6 +130,7 @@ class Died(BaseException):
     pass
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_without_losing_or_repeating_rows(logs, tmp_path, monkeypatch):
     monkeypatch.setattr(batches, "ROWS", 4)
     out, solved = tmp_path / "fits.csv", []

@@ -141,6 +141,7 @@ def test_every_argument_against_finite_differences(data, gaussian, kind):
         np.testing.assert_allclose(found[i] @ direction, (4 * fine - coarse) / 3, rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_on_the_border_the_parameter_does_not_move_and_the_others_do(data):
     box = jnp.asarray([[0.05, 0.004], [0.1, 0.1]])  # above the positive direction's 0.03
     term = bumped()
@@ -162,6 +163,7 @@ def test_on_the_border_the_parameter_does_not_move_and_the_others_do(data):
     np.testing.assert_allclose(np.asarray(by_force)[index][:, up] / scale, exact / scale, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_bounds_move_the_parameter_on_the_border_and_no_other(data):
     term = bumped()
 

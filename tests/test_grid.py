@@ -39,6 +39,7 @@ def grid_of(term, scales, half_width=None, given=None):
     return np.asarray(values), np.asarray(box)
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(unit=lengths, cycles=st.floats(20, 900), harmonics=st.sampled_from([1, 3]))
 def test_a_pitch_has_four_points_a_cycle_and_harmonic(unit, cycles, harmonics):
@@ -279,6 +280,7 @@ def found_again(name, base, noise=0.5, seed=1):
     return jf.identify(base + term, with_force(run, model, noise, seed)), model
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sticky_spot", "friction_step"])
 def test_a_further_term_is_found_from_the_default_bounds(name):
     found, model = found_again(name, models.coulomb_viscous())

@@ -157,6 +157,7 @@ def test_nodes_that_lie_are_found_out(monkeypatch):
     assert not bool(found.converged) and np.isinf(found.minimum)
 
 
+@pytest.mark.slow
 def test_fewer_nodes_that_lie_do_not_decide(monkeypatch):
     """They see a bump of three times the width, and propose another point of each stretch."""
 

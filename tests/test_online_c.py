@@ -67,6 +67,7 @@ def test_the_generated_c_follows_as_python_does(tmp_path):
     np.testing.assert_allclose(c.parameters(), wanted, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_watch_writes_it_for_a_stream(tmp_path, capsys):
     path, out = tmp_path / "axis.csv", tmp_path / "axis.c"
     write(path, 6.0)

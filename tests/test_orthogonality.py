@@ -116,6 +116,7 @@ def pieces(order):
     )
 
 
+@pytest.mark.slow
 def test_the_order_of_windows_does_not_matter():
     first, _ = friction(pieces((0, 1)), "gaussian")
     second, _ = friction(pieces((1, 0)), "gaussian")

@@ -79,6 +79,7 @@ def test_the_record_is_one_closed_period(period):
     assert np.linalg.norm((force - friction - inertial)[slip]) < 0.005 * np.linalg.norm(force[slip])
 
 
+@pytest.mark.slow
 def test_alm_is_exact_without_noise(period):
     found = identify("lorentzian", period)
     assert found.projection == "closed_windows"
@@ -128,6 +129,7 @@ def test_neither_mass_nor_acceleration_is_needed_and_p_needs_the_right_mass(peri
     assert curve_error(found, 0.002, 0.18) < 0.02
 
 
+@pytest.mark.slow
 def test_on_a_whole_period_a_wrong_mass_does_not_hurt_p(period):
     """Lemma 1: so problem (P) is not worse than (L) here, only dearer."""
     truth = scenario.machine()

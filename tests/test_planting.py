@@ -62,6 +62,7 @@ def test_a_plan_of_nothing_is_refused():
 # What is planted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", planting.planted())
 def test_the_force_has_its_size(recording, name):
     case = proof.Case("a-001", "single", 5, (name,), (0.1, 0.1))

@@ -107,6 +107,7 @@ def test_the_hard_cases_are_hard(name):
     assert max(lost) > 100 * tolerance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 5, 63, 64, 65, 200])
 def test_tiles_cover_every_grid(count):
     velocity, force, weight, columns, *_ = case("plain", 300)
@@ -125,6 +126,7 @@ def test_tiles_cover_every_grid(count):
     np.testing.assert_allclose(found[0, np.asarray(some)], jnp.stack(alone), rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_grid():
     velocity, force, weight, columns, *_ = case("plain", 20000)
     rows = reduced.moments(
@@ -154,6 +156,7 @@ def quadratic_well(centre):
     return residuals
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("centre", [0.3, 0.003, -0.2, 0.0, 1.0, 1.4])
 def test_refinement_stays_in_its_cell_and_never_worsens(centre):
     residuals, cell = quadratic_well([centre]), jnp.asarray([0.05])
@@ -208,6 +211,7 @@ def slope_of_cost(name, speed, force, log_beta):
     return float((16 * e - d) / 15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gaussian", "lorentzian", "exponential"])
 @pytest.mark.parametrize(("noise", "points"), [(0.1, None), (1.0, None), (1.0, 64)])
 def test_the_minimiser_is_the_root_of_the_derivative(name, noise, points):
@@ -256,6 +260,7 @@ def test_never_worse_than_the_grid_on_noise_alone():
             assert costs[-1] <= costs[:-1].min() * (1 + 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gaussian", pytest.param("generalised", marks=pytest.mark.slow)])
 def test_single_precision_is_sane(name):
     rng = np.random.default_rng(5)

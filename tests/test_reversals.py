@@ -136,6 +136,7 @@ def test_what_does_not_act_at_reversals_is_found_without_them():
     assert len(last.terms) == len(last.betas) == len(last.alphas) == 1 + len(selected)
 
 
+@pytest.mark.slow
 def test_an_axis_that_sticks_is_asked_once():
     recording = sticking()
     problem, found = searched(recording)

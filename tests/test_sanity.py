@@ -92,6 +92,7 @@ def test_a_wrong_zero_is_a_zero_and_no_mass(motion, joint):
     assert right.model.qpos0[joint] == pytest.approx(0.1, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 2e-3])
 def test_two_clocks(motion, rate):
     time, position, force = motion

@@ -365,6 +365,7 @@ def test_masked_samples_have_no_weight_and_open_no_window():
     assert float(jnp.sum(jnp.where(valid, 0.0, found.positive + found.negative))) == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(
     st.sampled_from([1, 2, 3, 100, 8195]),

@@ -133,6 +133,7 @@ def test_spring_with_coulomb_friction_loses_the_same_amplitude_every_half_swing(
     assert got.velocity[-1] == 0.0
 
 
+@pytest.mark.slow
 def test_energy_balance_of_a_stribeck_axis_in_closed_loop():
     model = stribeck_axis()
     got = simulate(model, sine(rate=4000.0), loop())
@@ -152,6 +153,7 @@ def test_position_dependent_inertia_conserves_energy():
     np.testing.assert_allclose(energy, energy[0], rtol=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(st.integers(-6, 6), st.integers(-6, 6))
 def test_units_do_not_matter(force, position):
@@ -200,6 +202,7 @@ def test_gradient_matches_finite_differences(smooth):
         np.testing.assert_allclose(slope, (ends[0] - ends[1]) / (2 * step), rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_smooth_approaches_exact_as_its_velocity_shrinks():
     reference, errors = sine(1.0, 500.0), []
     exact = simulate(stribeck_axis(), reference, loop(), substeps=32)
@@ -337,6 +340,7 @@ def test_emps_in_closed_loop_meets_the_published_simulation_error():
     assert float(force) < 0.08
 
 
+@pytest.mark.slow
 def test_a_delay_is_predicted_in_whole_inside_each_segment():
     values = {"inertia": 5.0} | {f"{n}{s}": 2.0 for n in ("coulomb", "viscous") for s in "+-"}
     model = models.from_parameters(models.coulomb_viscous(), values)

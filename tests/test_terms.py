@@ -106,6 +106,7 @@ def test_vmap_over_parameters_is_the_rows(term):
         np.testing.assert_allclose(columns, term.with_beta(beta).columns(motion()), rtol=1e-14)
 
 
+@pytest.mark.slow
 @each_term
 def test_derivative_by_beta_agrees_with_finite_differences(term):
     beta, recording = term.beta(), motion()
