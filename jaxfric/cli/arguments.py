@@ -132,7 +132,8 @@ def _add_baseline(command) -> None:
         "--joint",
         metavar="NAME",
         help="one joint of the model of --mujoco; --columns NAME_position=COLUMN,NAME_force=COLUMN "
-        "where names do not speak for themselves",
+        "where names do not speak for themselves; NAME_command=COLUMN where the log holds what the "
+        "joint's actuator was told (MuJoCo's ctrl)",
     )
     command.add_argument(
         "--simulation-holdout",

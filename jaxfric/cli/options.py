@@ -90,7 +90,7 @@ def _columns(command: ArgumentParser):
         type=names,
         default={},
         metavar="ROLE=NAME,…",
-        help="for instance force=vir,position=qm",
+        help="for instance force=vir,position=qm; neighbour_velocity=v2 for an axis beside it",
     )
     group.add_argument(
         "--scale",

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..data.io import read_with_notes
-from ..data.joints import columns_of, references_of
+from ..data.joints import COMMAND, columns_of, references_of
 from ..data.provenance import sha256
 from ..data.recording import Recording
 from ..data.tables import load
@@ -78,7 +78,9 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     """
     logs = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
     columns = [_columns(path, joints, arguments) for path in logs]
-    whole = [joint for joint in joints if all("force" in each.get(joint, {}) for each in columns)]
+    whole = [
+        j for j in joints if all({"force", COMMAND} & each.get(j, {}).keys() for each in columns)
+    ]
     chosen = [arguments.joint] if arguments.joint else whole
     if not whole and (len(joints) == 1 or arguments.joint):
         chosen = [arguments.joint or joints[0]]
@@ -124,15 +126,18 @@ def _opened(name: str, shared, paths, columns, arguments: Namespace, hinge: bool
     logs, notes = list[Recording](), list[str]()
     reference: np.ndarray | None = None
     try:
-        simulator = Mujoco(arguments.mujoco, name, shared=shared)
+        commanded = COMMAND in columns[0].get(name, arguments.columns)
+        simulator = Mujoco(arguments.mujoco, name, shared=shared, commanded=commanded)
         for path, own in zip(paths, columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)
+            log = simulator.driven(log) if commanded else log
             channels = dict(log.channels)
             wanted = channels.pop("reference", None)
             if wanted is not None and not logs:
                 reference = np.asarray(wanted, float)
             logs.append(dataclasses.replace(log, channels=channels))
             notes += more
+        notes += simulator.standing
     except ValueError as error:
         return Joint(name, None, _refusal(error, paths), logs, None, notes)
     return Joint(name, None, "", logs, simulator, notes, reference, logs[0])
@@ -180,7 +185,9 @@ def _joint(joint: Joint, looked: Looked | None, source, shared, arguments: Names
     held = logs[1] if len(logs) > 1 else None
     try:
         zeros = looked.faults.zeros if looked is not None else {}
-        simulator = Mujoco(source, joint.name, folder_of(arguments.mujoco), shared, zeros)
+        commanded = joint.simulator.actuator is not None
+        folder = folder_of(arguments.mujoco)
+        simulator = Mujoco(source, joint.name, folder, shared, zeros, commanded)
         baseline = simulator if looked is None else looked.standing_on(simulator)
         told = explain(logs[0], baseline, held, simulate=arguments.simulate)
     except ValueError as error:
@@ -199,11 +206,16 @@ def _log(
     units = {"force": "N·m", "position": "rad"} if hinge else {"force": "N", "position": "m"}
     units |= arguments.units
     if not own:
-        given = Namespace(**vars(arguments) | {"units": units})
+        columns = dict(arguments.columns)
+        if COMMAND in columns:
+            columns["force"] = columns.pop(COMMAND)
+        given = Namespace(**vars(arguments) | {"units": units, "columns": columns})
         log, notes = read(path, given)
     else:
         others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
         roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
+        if COMMAND in roles:
+            roles["force"] = roles.pop(COMMAND)
         wanted = references_of(load(Path(path)).columns, list(own), arguments.columns)
         if name in wanted:
             roles["reference"] = wanted[name]

@@ -11,6 +11,8 @@ from .columns import describe
 from .printable import listed
 
 ROLES = ("position", "force")
+# What the joint's actuator was told, in its own unit, in place of the joint's force.
+COMMAND = "command"
 # What stands in topics and headers beside joint and role.
 _BESIDE = frozenset("joint joints state states jointstate jointstates data robot arm".split())
 
@@ -26,7 +28,8 @@ def columns_of(
     """The columns of position and force of each joint that the log has both of.
 
     **Arguments:** `given`, what the user says: `elbow` (its position; its force is then the column
-    that differs from it in the role alone), `elbow_position`, `elbow_force`, each with a column.
+    that differs from it in the role alone), `elbow_position`, `elbow_force`, or `elbow_command` for
+    what its actuator was told, each with a column.
 
     **Raises:** `ValueError` if two columns stand for one role of one joint, or a column that is
     given is not there.
@@ -51,7 +54,7 @@ def columns_of(
                     f"{listed(several)}. Say which: --columns {joint}_{role}={several[0]}."
                 )
     picked = {
-        joint: {role: roles[role][0] for role in ROLES if role in roles}
+        joint: {role: roles[role][0] for role in (*ROLES, COMMAND) if role in roles}
         for joint, roles in found.items()
     }
     return {joint: roles for joint, roles in picked.items() if "position" in roles}
@@ -134,7 +137,7 @@ def _given(joint, given, names, numbered, source: str) -> dict[str, str]:
     """What the user says of a joint."""
     found = {}
     for key, role in ((joint, "position"), (f"{joint}_position", "position"),
-                      (f"{joint}_force", "force")):  # fmt: skip
+                      (f"{joint}_force", "force"), (f"{joint}_command", COMMAND)):  # fmt: skip
         if key not in given:
             continue
         if given[key] not in names:

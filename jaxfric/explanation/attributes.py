@@ -31,8 +31,11 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
         for name, value in told.model.parameters.items()
         if name in own
     }
+    rate = float(told.recording["sample_rate"])
+    own = {key: a._replace(between=1 / rate) if a.unit == "s" else a for key, a in own.items()}
     findings = [
-        _reworded(f, own) if f.effect == MISMATCH else _stepped(f, own, now) for f in told.findings
+        _reworded(f, own) if f.effect == MISMATCH else _late(_stepped(f, own, now), own)
+        for f in told.findings
     ]
     values = {
         name: _absolute(estimate, own[name]) if name in own and name != GAIN else estimate
@@ -53,7 +56,8 @@ def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
         for text, (name, m) in zip(texts, moved.items(), strict=True)
     ]
     share = f"{finding.share:.0%} of the unexplained force"
-    names = [name for name in moved if name in own or name.endswith(REFERENCE)]
+    geared = {_gear(own)} - {GAIN}
+    names = [n for n in moved if n in own or n in geared or n.endswith(REFERENCE)]
     return finding._replace(
         parameters=moved,
         sentence=f"Wrong in the simulator: {'; '.join(texts)}; {share}.",
@@ -67,29 +71,52 @@ def _attributes(moved: Mapping[str, Moved], own: Mapping[str, Attribute]) -> dic
     for name, m in moved.items():
         if name == GAIN:
             before, times = own[GAIN].value, 1 + float(m.value)
-            # A gear of less force for each command, where more of it is recorded.
-            geared = own[GAIN].what == "gear"
-            value = before / times if geared else before * times
-            found[_gear(own)] = Moved(
-                before, np.float64(value), float(m.standard_error) * abs(value / times), "1"
-            )
+            # A gain of less force for each command, where more of it is recorded.
+            value = before * times if own[GAIN].what == GAIN else before / times
+            error = float(m.standard_error) * abs(value / times)
+            found[_gear(own)] = Moved(before, np.float64(value), error, own[GAIN].unit)
         elif name in own:
             before = own[name].value
-            found[name] = Moved(before, np.float64(before + m.value), m.standard_error, m.unit)
+            # What a command does between its samples is anywhere within one of them.
+            error = np.hypot(m.standard_error, own[name].between / np.sqrt(12))
+            found[name] = Moved(before, np.float64(before + m.value), error, m.unit)
         else:
             found[name] = m
     return _sprung(found, own)
 
 
 def _gear(own: Mapping[str, Attribute]) -> str:
-    """The name of the gain: the actuator's gear where there is one.
+    """The name of the gain: the actuator's gear, or what else says it, where there is one.
 
     A model whose force the joint's own values make alone has no gain beside them.
     """
     attribute = own.get(GAIN)
-    if attribute is None:
+    if attribute is None or attribute.what == GAIN:
         return GAIN
-    return attribute.owner.replace(" ", "/", 1) + "/gear" if attribute.what == "gear" else GAIN
+    return f"{attribute.owner.replace(' ', '/', 1)}/{attribute.what}"
+
+
+# Without a command in the log, what else a constant force may be.
+MAY_BE = (
+    "the actuator's bias, which a log of its command would show, the zero of the force's sensor, "
+    "or a weight that the model lacks"
+)
+# A filter that the model's actuator lacks, in MuJoCo's own words.
+FILTER = "filterexact"
+
+
+def _late(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
+    """A delay or a lag as the actuator's attribute, where the joint has one."""
+    effect, owner = EFFECTS.get(finding.effect), own[GAIN].owner if GAIN in own else ""
+    if effect is None or not effect.late or not owner.startswith("actuator "):
+        return finding
+    what = effect.shift or "dynprm[0]"
+    name = f"{owner.replace(' ', '/', 1)}/{what}"
+    if effect.shift or name in own:
+        return finding._replace(attribute=name)
+    time = quantity(next(iter(finding.parameters.values())), smaller=False)
+    text = f"{owner}: dyntype none → {FILTER}, dynprm[0] 0 → {time}: {finding.sentence}"
+    return finding._replace(attribute=name, sentence=text)
 
 
 def _sprung(found: dict[str, Moved], own: Mapping[str, Attribute]) -> dict[str, Moved]:
@@ -161,7 +188,7 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
     value = Estimate(m.value, m.standard_error, "" if m.unit == "1" else m.unit)
     said = quantity(value, smaller=name == CONSTANT)
     if name == CONSTANT:
-        return f"a constant force of {said}, for which it has no attribute"
+        return f"a constant force of {said}, for which it has no attribute (it may be {MAY_BE})"
     if name == GAIN:
         size = quantity(Estimate(abs(m.value), m.standard_error, ""))
         if m.value < 0:
@@ -170,8 +197,8 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
                 "simulator's (--scale force=-1)"
             )
         return f"the recorded force (the torque constant) is {size} times the simulator's"
-    if name.endswith("/gear"):
-        return f"{own[GAIN].owner}: gear {m.before:.4g} → {said}"
+    if name == _gear(own):
+        return f"{own[GAIN].owner}: {own[GAIN].what} {m.before:.4g} → {said}"
     if name in own:
         attribute = own[name]
         text = f"{attribute.owner}: {attribute.what} {attribute.value:.4g} → {said}"

@@ -11,14 +11,14 @@ from ..data.recording import Recording
 from ..explanation import Explanation
 from ..explanation.attributes import CONSTANT, GAIN
 from ..explanation.errors import through_kernel
+from ..identification.uncertainty import Estimate
 from ..models import Model
-from ..simulators import Mujoco
-from ..simulators.columns import actuator_of
+from ..simulators import Mujoco, actuation
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
-from ..terms.effects import EFFECTS
+from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
 from .rerun import Rerun, rerun
@@ -32,6 +32,10 @@ class Again(NamedTuple):
     simulators: dict[str, Mujoco]
     logs: dict[str, Recording]
     references: dict[str, np.ndarray]
+
+
+# A time that is not there.
+NONE = Estimate(np.float64(0.0), np.float64(0.0), "s")
 
 
 class Patch(NamedTuple):
@@ -108,20 +112,26 @@ def patch(
     errors = {}
     shared: dict[bytes, Any] = {}
     for joint, told in found.items():
+        commanded = _commanded(recordings[joint][0])
         pair = (
-            Mujoco(source, joint, shared=shared),
-            Mujoco(done.text, joint, folder_of(source), shared),
+            Mujoco(source, joint, shared=shared, commanded=commanded),
+            Mujoco(done.text, joint, folder_of(source), shared, commanded=commanded),
         )
         errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
     patch = Patch(done.text, forces, written, left, errors, module)
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
 
 
+def _commanded(recording: Recording) -> bool:
+    """Whether a recording is of the actuator's command."""
+    return actuation.COMMAND in recording.channels
+
+
 def _put_right(source, joint: str, told: Explanation):
     """What was put right before any physics, and a dead time, as attributes; and what has none."""
     model = Mujoco(source, joint)
     values: dict[str, tuple[float, float]] = {}
-    left = []
+    left: list[str] = []
     for finding in told.findings:
         if finding.effect == "position_zero" and finding.attribute:
             (zero,) = finding.parameters.values()
@@ -131,16 +141,24 @@ def _put_right(source, joint: str, told: Explanation):
             (limit,) = finding.parameters.values()
             values[finding.attribute] = float("inf"), float(limit.value)
         elif finding.effect in EFFECTS and EFFECTS[finding.effect].shift:
-            delay = float(finding.parameters["delay"].value)
-            number = actuator_of(model.mujoco, model.model, model.number)
-            if number is None:
-                left.append(f"joint {joint}: a delay of {delay:.4g} s: it has no actuator for it")
-            else:
-                name = model.model.actuator(number).name or f"actuator{number + 1}"
-                values[f"actuator/{name}/delay"] = 0.0, delay
+            _late(model, "delay", "a delay", finding.parameters["delay"], values, left)
+        elif finding.effect in EFFECTS and EFFECTS[finding.effect].late:
+            _late(model, "dynprm[0]", "a lag", finding.parameters["lag"], values, left)
         elif finding.effect == "clock":
             left.append(f"joint {joint}: the clock of the force: it is the log's, not the model's")
     return values, left
+
+
+def _late(model: Mujoco, what: str, said: str, time, values, left: list[str]) -> None:
+    """A delay or a lag as the value of the joint's actuator, or that it has none."""
+    try:
+        own = actuation.read(model.mujoco, model.model, model.number)
+    except ValueError:
+        text = f"joint {model.joint}: {said} of {float(time.value):.4g} s"
+        left.append(f"{text}: it has no actuator for it")
+        return
+    before = own.delay if what == "delay" else own.constant
+    values[own.path(what)] = before, before + float(time.value)
 
 
 def _again(source, patch: Patch, found: dict[str, Explanation], again: Again) -> Rerun:
@@ -154,9 +172,9 @@ def _again(source, patch: Patch, found: dict[str, Explanation], again: Again) ->
     )  # fmt: skip
 
 
-def _acting(told: Explanation) -> tuple[float, float, float]:
-    """Gain, limit and dead time between the recorded command and the joint."""
-    gain, limit, delay = 1.0, np.inf, 0.0
+def _acting(told: Explanation) -> tuple[float, float, float, float]:
+    """Gain, limit, dead time and lag between the recorded command and the joint."""
+    gain, limit, delay, lag = 1.0, np.inf, 0.0, 0.0
     for name, moved in _moved(told).items():
         if name == GAIN:
             gain = float(moved.value)
@@ -166,8 +184,9 @@ def _acting(told: Explanation) -> tuple[float, float, float]:
         if finding.effect == "force_limit":
             limit = float(next(iter(finding.parameters.values())).value)
         elif finding.effect in EFFECTS and EFFECTS[finding.effect].late:
-            delay = float(next(iter(finding.parameters.values())).value)
-    return gain, limit, delay
+            delay = float(finding.parameters.get("delay", NONE).value)
+            lag = float(finding.parameters.get("lag", NONE).value)
+    return gain, limit, delay, lag
 
 
 def _moved(told: Explanation):
@@ -191,7 +210,7 @@ def _beside(told: Explanation) -> Model | None:
         start += len(term.affine)
         known = isinstance(term, KnownForce | KnownColumns)
         sprung = [p.name for p in term.affine] == [CONSTANT] and CONSTANT not in _moved(told)
-        if not known and not sprung and np.any(alpha):
+        if not known and not sprung and not traits(term).late and np.any(alpha):
             kept.append(term)
             alphas.append(alpha)
     if not kept:
@@ -206,19 +225,26 @@ def _speed(recording: Recording) -> float:
 
 def _errors(told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None):
     """The force errors through the kernel: before, of the file, and with the forces beside it."""
-    gear = 1.0
-    if GAIN in after.attributes() and after.attributes()[GAIN].what == "gear":
-        gear = before.attributes()[GAIN].value / after.attributes()[GAIN].value
     delay = told.fit["filtered_force_error"]["force_taken_later"]
     found = {}
     for name, log in zip(("force_error", "holdout_force_error"), recordings, strict=False):
-        scaled = dataclasses.replace(log, force=log.force / gear)
+        made = _made(before, after, log)
         error = {
             "before": through_kernel(before.baseline(log.units), before.beside(log), delay),
-            "file": through_kernel(after.baseline(log.units), after.beside(scaled), delay),
+            "file": through_kernel(after.baseline(log.units), after.beside(made), delay),
         }
         if forces is not None:
             model = Model(Sum((KnownForce(), *summands(forces.term))), forces.alpha, log.units)
-            error["forces"] = through_kernel(model, after.beside(scaled), delay)
+            error["forces"] = through_kernel(model, after.beside(made), delay)
         found[name] = error
     return found
+
+
+def _made(before: Mujoco, after: Mujoco, log: Recording) -> Recording:
+    """The recording with the joint's force that the model after makes of the command."""
+    if after.actuator is not None:
+        return after.driven(dataclasses.replace(log, force=log.channels[actuation.COMMAND]))
+    gear = 1.0
+    if GAIN in after.attributes() and after.attributes()[GAIN].what == "gear":
+        gear = before.attributes()[GAIN].value / after.attributes()[GAIN].value
+    return dataclasses.replace(log, force=log.force / gear)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..simulators import Mujoco, closed
+from ..simulators.actuation import COMMAND
 from ..simulators.inverse import Motion
 from ..simulators.loading import is_hinge, is_text, read
 
@@ -86,13 +87,13 @@ class Rerun(NamedTuple):
 def rerun(
     before: str | Path, after: str, folder: Path | None, simulators: Mapping[str, Mujoco],
     logs: Mapping[str, Recording], references: Mapping[str, np.ndarray],
-    actuation: Mapping[str, tuple[float, float, float]], beside: Mapping[str, closed.Beside],
+    acting: Mapping[str, tuple[float, float, float, float]], beside: Mapping[str, closed.Beside],
 ) -> Rerun:  # fmt: skip
     """Run both models again.
 
     **Arguments:** `before` and `after`, the models; by joint: the `simulators` of the log, its
-    `logs` as they were put right, the `references`, `(N,)`, gain, limit and dead time of the
-    `actuation`, and the forces `beside` the model after.
+    `logs` as they were put right, the `references`, `(N,)`, gain, limit, dead time and lag of what
+    is `acting`, and the forces `beside` the model after.
     """
     some = next(iter(simulators.values()))
     mujoco, names = some.mujoco, tuple(some.joints)
@@ -107,12 +108,15 @@ def rerun(
     if law is not None and not law.known:
         worst = int(np.argmax(law.left))
         return Rerun(NO_LAW.format(joint=names[worst], left=law.left[worst]))
-    acting = closed.Actuation(
-        *np.array([actuation.get(joint, (1.0, np.inf, 0.0)) for joint in names]).T
-    )
+    commanded = _commanded(simulators, logs, names)
+    before_ = closed.ideal(len(names))._replace(actuators=commanded)
+    plain = (1.0, np.inf, 0.0, 0.0)
+    # What is between command and joint is in the model where it takes the command.
+    values = [plain if i in commanded else acting.get(name, plain) for i, name in enumerate(names)]
+    after_ = closed.Actuation(*np.array(values).T, actuators=commanded)
     own = {names.index(joint): force for joint, force in beside.items()}
-    first = closed.run(mujoco, models[0], log, law, closed.ideal(len(names)))
-    second = closed.run(mujoco, models[1], log, law, acting, own)
+    first = closed.run(mujoco, models[0], log, law, before_)
+    second = closed.run(mujoco, models[1], log, law, after_, own)
     if first is None or second is None:
         return Rerun(LOST.format(when="before" if first is None else "after"))
     return Rerun(
@@ -125,11 +129,25 @@ def rerun(
 def _log(some: Mujoco, names: Sequence[str], logs, references) -> closed.Log:
     own = logs[some.joint]
     motion: Motion = some.along(own).motion
-    force = np.stack([np.asarray(logs[name].force, float) for name in names], axis=1)
+    force = np.stack(
+        [np.asarray(logs[n].channels.get(COMMAND, logs[n].force), float) for n in names], axis=1
+    )
     reference = np.stack([np.asarray(references[name], float) for name in names], axis=1)
     known = np.isfinite(force) & np.isfinite(reference)
     force, reference = (np.where(known, values, 0.0) for values in (force, reference))
     return closed.Log(np.asarray(own.time, float), motion, force, reference)
+
+
+def _commanded(
+    simulators: Mapping[str, Mujoco], logs: Mapping[str, Recording], names: Sequence[str]
+) -> dict[int, int]:
+    """By joint whose command the log holds the actuator that takes it."""
+    found = {}
+    for i, name in enumerate(names):
+        own = simulators[name].actuator if name in simulators else None
+        if own is not None and COMMAND in logs[name].channels:
+            found[i] = own.number
+    return found
 
 
 def _law(mujoco: Any, models: Sequence[Any], log: closed.Log) -> closed.Law:

@@ -112,16 +112,20 @@ def servos(mujoco: Any, model: Any) -> bool:
 
 
 class Actuation(NamedTuple):
-    """What stands between command and joint: gain, limit, N, and dead time, s, each `(dof,)`."""
+    """What stands between command and joint: gain, limit, N, dead time and lag, s, `(dof,)` each;
+    `actuators`: by joint that of the model which takes the command, so that all this is its own.
+    """
 
     gain: np.ndarray
     limit: np.ndarray
     delay: np.ndarray
+    lag: np.ndarray
+    actuators: Mapping[int, int] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
 
 
 def ideal(dof: int) -> Actuation:
     """Commands that arrive as they are."""
-    return Actuation(np.ones(dof), np.full(dof, np.inf), np.zeros(dof))
+    return Actuation(np.ones(dof), np.full(dof, np.inf), np.zeros(dof), np.zeros(dof))
 
 
 def run(
@@ -139,8 +143,13 @@ def run(
     """
     steps = max(1, round(float(np.median(np.diff(log.time))) / model.opt.timestep))
     kept = float(model.opt.timestep)
+    flags = int(model.opt.disableflags)
+    if law is not None and not actuation.actuators:
+        # The law's force is the joint's: what the model's actuators make of no command is not.
+        model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
     data = mujoco.MjData(model)
     data.qpos[:], data.qvel[:] = log.motion.position[0], log.motion.velocity[0]
+    _begin(data, model, log, law, actuation)
     found = np.full(log.motion.position.shape, np.nan)
     loop = _Loop(model, log, law, actuation)
     most = LOST * np.ptp(log.motion.position, axis=0)
@@ -149,7 +158,7 @@ def run(
     ):
         found[i] = data.qpos
         if not np.all(np.abs(data.qpos - log.motion.position[i]) <= most):
-            model.opt.timestep = kept
+            model.opt.timestep, model.opt.disableflags = kept, flags
             return None
         model.opt.timestep = max(span / steps, 1e-9)
         for k in range(steps if span > 0 else 0):
@@ -158,8 +167,17 @@ def run(
             for joint, force in (beside or {}).items():
                 data.qfrc_applied[joint] -= force(data.qpos[joint], data.qvel[joint], data.time)
             mujoco.mj_step2(model, data)
-    model.opt.timestep = kept
+    model.opt.timestep, model.opt.disableflags = kept, flags
     return found
+
+
+def _begin(data: Any, model: Any, log: Log, law: Law | None, actuation: Actuation) -> None:
+    """The actuators' filters where the recording begins."""
+    first = log.reference[0] if law is None else log.force[0]
+    for i in range(model.nu):
+        at, joint = int(model.actuator_actadr[i]), int(model.actuator_trnid[i, 0])
+        if at >= 0 and (law is None or joint in actuation.actuators):
+            data.act[at] = first[joint]
 
 
 class _Loop:
@@ -172,6 +190,7 @@ class _Loop:
         self.sum, self.before = np.zeros(model.nv), float(log.time[0])
         self.joints = [int(j) for j in model.actuator_trnid[:, 0]] if law is None else []
         self.late: list[tuple[float, np.ndarray]] = []
+        self.acting: np.ndarray | None = None
 
     def drive(self, data: Any, now: float) -> None:
         """Set the command of one step."""
@@ -184,8 +203,8 @@ class _Loop:
             data.ctrl[:] = wanted[self.joints]
             data.qfrc_applied[:] = 0.0
             return
-        error = wanted - data.qpos
-        self.sum += error * (now - self.before)
+        error, span = wanted - data.qpos, now - self.before
+        self.sum += error * span
         self.before = now
         values = {
             "position error": error,
@@ -196,11 +215,22 @@ class _Loop:
             "acceleration": rate,
         }
         asked = sum(self.law.gains[:, i] * values[p] for i, p in enumerate(self.law.parts))
-        data.qfrc_applied[:] = self._arriving(np.asarray(asked), now)
+        acting = self._lagging(self._arriving(np.asarray(asked), now), span)
+        for joint, number in self.actuation.actuators.items():
+            data.ctrl[number], acting[joint] = acting[joint], 0.0
+        data.qfrc_applied[:] = acting
+
+    def _lagging(self, arriving: np.ndarray, span: float) -> np.ndarray:
+        lag = self.actuation.lag
+        if self.acting is None or not np.any(lag > 0):
+            self.acting = arriving
+        kept = np.exp(-span / np.where(lag > 0, lag, np.inf)) * (lag > 0)
+        self.acting = arriving + kept * (self.acting - arriving)
+        return self.acting.copy()
 
     def _arriving(self, asked: np.ndarray, now: float) -> np.ndarray:
-        gain, limit, delay = self.actuation
-        asked = np.clip(asked, -limit, limit) / gain
+        limit, delay = self.actuation.limit, self.actuation.delay
+        asked = np.clip(asked, -limit, limit) / self.actuation.gain
         if not np.any(delay > 0):
             return asked
         self.late.append((now, asked))

@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import rigid
+from . import actuation, rigid
+from .actuation import Actuator
 from .inverse import Along, Motion, along, weighed, with_friction
 from .known import Attribute
 from .loading import is_hinge
@@ -25,15 +26,26 @@ class Columns(NamedTuple):
 
     attributes: Mapping[str, Attribute]
     makers: Mapping[str, Callable[[Along], Parts]]
+    timed: Mapping[str, Callable[[Along, np.ndarray], Parts]] = {}  # noqa: RUF012 - never changed
 
-    def along(self, seen: Along) -> list[Parts]:
-        """Rest and momentum of each, in the order of the attributes."""
-        return [self.makers[name](seen) for name in self.attributes]
+    def along(self, seen: Along, time: np.ndarray) -> list[Parts]:
+        """Rest and momentum of each, in the order of the attributes; `time` of the motion, s."""
+        return [
+            self.timed[name](seen, time) if name in self.timed else self.makers[name](seen)
+            for name in self.attributes
+        ]
 
 
-def distinct(mujoco: Any, model: Any, joint: int, name: str) -> Columns:
-    """The parameters that a joint's force depends on, one for each that no motion tells apart."""
+def distinct(
+    mujoco: Any, model: Any, joint: int, name: str, actuator: Actuator | None = None
+) -> Columns:
+    """The parameters that a joint's force depends on, one for each that no motion tells apart.
+
+    `actuator`: where the log is of its command, whose own values then show too.
+    """
     every = {**_of_joint(mujoco, model, joint, name), **_of_bodies(mujoco, model, joint)}
+    if actuator is not None:
+        every = _of_actuator(every, actuator, joint, name)
     draw = np.random.default_rng(0)
     motion = Motion(*draw.uniform(-1.5, 1.5, (3, STATES, model.nv)))
     seen = along(mujoco, model, motion)
@@ -52,7 +64,23 @@ def distinct(mujoco: Any, model: Any, joint: int, name: str) -> Columns:
         else:
             own = attributes[twin]
             attributes[twin] = own._replace(alike=(*own.alike, str(attribute)))
-    return Columns(attributes, {key: every[key][1] for key in attributes})
+    makers = {key: every[key][1] for key in attributes}
+    if actuator is None or not actuator.constant:
+        return Columns(attributes, makers)
+    key, made = actuator.path("dynprm[0]"), actuator
+    timed = {key: lambda seen, time: actuation.by_constant(made, joint, seen, time)}
+    return Columns(attributes | {key: actuation.constant(made)}, makers, timed)
+
+
+def _of_actuator(every, actuator: Actuator, joint: int, name: str):
+    """With the values of an actuator in place of the force's gain, the joint's own values first."""
+    spring = every[f"joint/{name}/stiffness"][0]
+    sprung = f"springref of joint {name}" if spring.value else ""
+    gained = {
+        GAIN: (actuation.gain(actuator), lambda s: actuation.by_gain(actuator, joint, s)),
+        **actuation.columns(actuator, joint, sprung),
+    }
+    return {key: gained.pop(key, own) for key, own in every.items()} | gained
 
 
 def _of_joint(mujoco: Any, model: Any, joint: int, name: str):
@@ -88,21 +116,10 @@ def _of_joint(mujoco: Any, model: Any, joint: int, name: str):
         for what, (unit, values, maker) in found.items()
     }
     gear = Attribute(owner, "gain", 1.0, "1")
-    if (actuator := actuator_of(mujoco, model, joint)) is not None:
-        label = model.actuator(actuator).name or f"actuator{actuator + 1}"
-        gear = Attribute(f"actuator {label}", "gear", float(model.actuator_gear[actuator, 0]), "1")
+    if (number := actuation.only(mujoco, model, joint)) is not None:
+        name = f"actuator {actuation.label(model, number)}"
+        gear = Attribute(name, "gear", float(model.actuator_gear[number, 0]), "1")
     return named | {GAIN: (gear, lambda s: (s.rest[:, joint], s.momentum[:, joint]))}
-
-
-def actuator_of(mujoco: Any, model: Any, joint: int) -> int | None:
-    """The only actuator that acts on a joint itself; `None` where there is none, or several."""
-    kind = int(mujoco.mjtTrn.mjTRN_JOINT)
-    own = [
-        i
-        for i in range(model.nu)
-        if int(model.actuator_trntype[i]) == kind and int(model.actuator_trnid[i, 0]) == joint
-    ]
-    return own[0] if len(own) == 1 else None
 
 
 def _of_bodies(mujoco: Any, model: Any, joint: int):

@@ -35,7 +35,8 @@ class Attribute(NamedTuple):
 
     - `owner`: what it belongs to, "joint elbow" or "body forearm"; `what`: "damping"; `value` in
       the simulator, `unit`; `alike`: others whose force is the same at this joint but for a factor,
-      in words; `rest`: where a spring's force is zero.
+      in words; `rest`: where a spring's force is zero; `between`: of a time, the samples that it is
+      known from, s.
     """
 
     owner: str
@@ -44,6 +45,7 @@ class Attribute(NamedTuple):
     unit: str
     alike: tuple[str, ...] = ()
     rest: float = 0.0
+    between: float = 0.0
 
     def __str__(self) -> str:
         return f"{self.what} of {self.owner}"

@@ -15,7 +15,7 @@ from ..data.recording import Recording
 from ..models import Model
 from ..terms import KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import Sum
-from . import columns, inverse
+from . import actuation, columns, inverse
 from .known import AbstractSimulator, Attribute, along
 from .loading import joints_of, library, read
 from .touching import alone, at_limit, touching
@@ -39,7 +39,9 @@ class Mujoco(AbstractSimulator):
     recording is of, where there are several. The positions of the others are channels of the
     recording by their joints' names, in the model's own units, rad or m; `folder`, in which the
     meshes of a model that is given as text lie; `shared`, a memory for several joints of one log;
-    `zeros`, where the encoders' zeros are in the model's angles, rad or m by joint.
+    `zeros`, where the encoders' zeros are in the model's angles, rad or m by joint; `commanded`:
+    the log is of the command of the joint's actuator (MuJoCo's `ctrl`), and its recordings are
+    passed through `driven` first. Then the actuator's bias, gain and time constant are columns too.
 
     Nothing is compared where the joint is at a limit of the model, or bodies of it touch.
 
@@ -54,6 +56,7 @@ class Mujoco(AbstractSimulator):
         folder: Path | None = None,
         shared: dict[bytes, Any] | None = None,
         zeros: Mapping[str, float] | None = None,
+        commanded: bool = False,
     ):
         self.mujoco, self._source, self._folder = library(), str(model), folder
         self._shared = {} if shared is None else shared
@@ -76,7 +79,9 @@ class Mujoco(AbstractSimulator):
                 f"The model has no joint {joint!r}. Its joints are {', '.join(self.joints)}."
             )
         self.joint, self.number = joint, self.joints.index(joint)
-        self.columns = columns.distinct(self.mujoco, self.model, self.number, joint)
+        own = actuation.read(self.mujoco, self.model, self.number) if commanded else None
+        self.actuator: actuation.Actuator | None = own
+        self.columns = columns.distinct(self.mujoco, self.model, self.number, joint, own)
 
     def __call__(self, recording: Recording) -> Float[np.ndarray, " N"]:
         """The generalised force at the joint, N or N·m, `(N,)`."""
@@ -86,7 +91,9 @@ class Mujoco(AbstractSimulator):
         """The model's force, with corrections of zero to its parameters and a constant force."""
         own = self.attributes()
         names, spelled = tuple(own), tuple(each.unit for each in own.values())
-        term = Sum((KnownForce(), KnownColumns(names, spelled), Offset()))
+        # A constant force is the actuator's bias where the log is of its command.
+        constant = () if self.actuator is not None else (Offset(),)
+        term = Sum((KnownForce(), KnownColumns(names, spelled), *constant))
         return Model(term, jnp.zeros(len(term.affine)), units)
 
     def attributes(self) -> Mapping[str, Attribute]:
@@ -99,6 +106,11 @@ class Mujoco(AbstractSimulator):
         if key not in self._shared:
             self._shared[key] = self._channels(recording)
         force, sound = self._shared[key]
+        if self.actuator is not None and actuation.COMMAND not in recording.channels:
+            raise ValueError(
+                f"{recording.source or 'The recording'} is not of the joint's force but of the "
+                "actuator's command: pass it through the simulator's driven(recording) first."
+            )
         known = along(recording, force, held_out)
         # Where the other joints are is in the force; by their names programs would differ.
         kept = {name: each for name, each in known.channels.items() if name not in self.joints}
@@ -108,7 +120,8 @@ class Mujoco(AbstractSimulator):
         """The force, NaN where nothing is compared, and what stands beside it by channel."""
         seen, own = self.along(recording), self.number
         found = {KNOWN_REST: seen.rest[:, own], KNOWN_MOMENTUM: seen.momentum[:, own]}
-        for number, parts in enumerate(self.columns.along(seen)):
+        time = np.asarray(recording.time, float)
+        for number, parts in enumerate(self.columns.along(seen, time)):
             found |= dict(zip(channels_of(number), parts, strict=True))
         gone = self._sticks(seen) | self.limited(recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
@@ -145,7 +158,7 @@ class Mujoco(AbstractSimulator):
         """What the force along a motion depends on."""
         logs = [self._position(recording, name) for name in self.joints]
         zeros = repr(sorted(self.zeros.items()))
-        own = hashlib.sha256(f"{self._source} {zeros}".encode()).digest()
+        own = hashlib.sha256(f"{self._source} {zeros} {self.actuator}".encode()).digest()
         return own + self._places(logs)
 
     @staticmethod
@@ -178,7 +191,24 @@ class Mujoco(AbstractSimulator):
 
     def with_zeros(self, zeros: Mapping[str, float]) -> "Mujoco":
         """The same simulator with other zeros of the joints' encoders: their attribute `ref`."""
-        return Mujoco(self._source, self.joint, self._folder, self._shared, {**self.zeros, **zeros})
+        zeros = {**self.zeros, **zeros}
+        commanded = self.actuator is not None
+        return Mujoco(self._source, self.joint, self._folder, self._shared, zeros, commanded)
+
+    @property
+    def standing(self) -> list[str]:
+        """What of the actuator the log tells, and what it does not, in words."""
+        return actuation.standing(self.mujoco, self.model, self.number, self.actuator)
+
+    def driven(self, recording: Recording) -> Recording:
+        """The recording of a command as one of the joint's force, which the actuator makes of it.
+
+        **Arguments:** `recording`, whose force is the command of the joint's actuator, in the
+        actuator's own unit. It stays as the channel `known_command`.
+        """
+        if self.actuator is None:
+            raise ValueError("Say that the log is of the actuator's command: commanded=True.")
+        return actuation.driven(self.actuator, recording, self.along(recording), self.number)
 
     def _sticks(self, seen: inverse.Along) -> Bool[np.ndarray, " N"]:
         """Where the model's dry friction is below its limit: it creeps to rest there, `(N,)`.
@@ -224,9 +254,9 @@ def derived(recording: Recording):
     return position, velocity, acceleration
 
 
-def mujoco(model: str | Path, joint: str | None = None) -> Mujoco:
+def mujoco(model: str | Path, joint: str | None = None, *, commanded: bool = False) -> Mujoco:
     """A MuJoCo model (MJCF or URDF) as a baseline of `explain`.
 
     See [`Mujoco`][jaxfric.simulators.Mujoco].
     """
-    return Mujoco(model, joint)
+    return Mujoco(model, joint, commanded=commanded)

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import actuators
 from .inverse import weighed
 from .loading import is_hinge, is_text, joints_of, read
-from .tags import Bodies, Tag, bodies, edited, tags
+from .tags import Bodies, Tag, bodies, edited, number as _number, tags
 
 # What a file's number may differ from the value that it stands for, relative.
 ROUNDING = 1e-5
@@ -70,6 +71,8 @@ def _groups(values: Mapping[str, float]) -> list[dict[str, float]]:
     for key, value in values.items():
         kind, owner, what = key.split("/")
         whole = kind == "body" or what in ("stiffness", "springref", "ref")
+        # An actuator's law is written whole; its gear and its delay are attributes beside it.
+        whole |= kind == "actuator" and what not in ("gear", "delay")
         found.setdefault(f"{kind}/{owner}" if whole else key, {})[key] = value
     return list(found.values())
 
@@ -90,15 +93,12 @@ def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> 
         joint = names.index(owner)
         changes[tree.joints[joint]] = _of_joint(mujoco, model, joint, own, found)
     elif kind == "actuator":
-        changes |= _of_actuator(mujoco, model, owner, own, found)
+        changes, renamed = actuators.changed(mujoco, model, owner, own, found)
+        return edited(text, changes, new, renamed)
     else:
         body = next(b for b in range(1, model.nbody) if (model.body(b).name or f"body{b}") == owner)
         _of_body(mujoco, model, body, own, found, tree, changes, new)
     return edited(text, changes, new)
-
-
-def _number(value: float) -> str:
-    return f"{value:.7g}"
 
 
 def _of_joint(mujoco: Any, model: Any, joint: int, own: Mapping[str, float], found: list[Tag]):
@@ -127,27 +127,6 @@ def _in_degrees(found: list[Tag]) -> bool:
         t.attributes["angle"] for t in found if t.name == "compiler" and "angle" in t.attributes
     ]
     return not angles or angles[-1] != "radian"
-
-
-def _of_actuator(
-    mujoco: Any, model: Any, owner: str, values: Mapping[str, float], found: list[Tag]
-):
-    section = [i for i, tag in enumerate(found) if tag.name == "actuator"]
-    own = [i for i, tag in enumerate(found) if tag.parent in section]
-    number = next(
-        i for i in range(model.nu) if (model.actuator(i).name or f"actuator{i + 1}") == owner
-    )
-    if len(own) != model.nu:
-        raise ValueError("its actuators are not all written out in this file")
-    written: dict[str, str | None] = {}
-    if "gear" in values:
-        before = found[own[number]].attributes.get("gear", "1").split()
-        written["gear"] = " ".join([_number(values["gear"]), *before[1:]])
-    if "delay" in values:
-        # As many commands are kept as the delay holds.
-        count = int(np.ceil(values["delay"] / model.opt.timestep)) + 1
-        written |= {"delay": _number(values["delay"]), "nsample": str(count)}
-    return {own[number]: written}
 
 
 def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, new) -> None:
@@ -207,9 +186,7 @@ def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
             }  # fmt: skip
             read_back = float(place[what][joint])
         elif kind == "actuator":
-            number = new.actuator(owner).id
-            kept = new.actuator_gear[:, 0] if what == "gear" else new.actuator_delay
-            read_back = float(kept[number])
+            read_back = actuators.value(mujoco, new, owner, what)
         else:
             body = next(b for b in range(1, new.nbody) if (new.body(b).name or f"body{b}") == owner)
             whole = _wanted(mujoco, old, body, {k.split("/")[2]: v for k, v in group.items()})

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr
@@ -78,23 +79,38 @@ def _holder(found: list[Tag], number: int) -> int:
     return number
 
 
-def edited(text: str, changes: Mapping[int, Mapping[str, str | None]], new: Mapping[int, str]):
+def number(value: float) -> str:
+    """A number as it is written."""
+    return f"{value:.7g}"
+
+
+def edited(
+    text: str,
+    changes: Mapping[int, Mapping[str, str | None]],
+    new: Mapping[int, str],
+    renamed: Mapping[int, str] = MappingProxyType({}),
+) -> str:
     """The text with attributes of some tags set (`None`: taken away) and lines after others.
 
-    **Arguments:** `changes` by the number of the tag; `new`, an element to stand first in a tag.
+    **Arguments:** `changes` by the number of the tag; `new`, an element to stand first in a tag;
+    `renamed`, another name of a tag that has no end tag.
     """
     raw, found = text.encode(), tags(text)
-    for number in sorted({*changes, *new}, key=lambda n: -found[n].start):
-        start = found[number].start
+    for place in sorted({*changes, *new, *renamed}, key=lambda n: -found[n].start):
+        start = found[place].start
         stop = _end(raw, start)
         tag = raw[start:stop].decode()
-        for name, value in changes.get(number, {}).items():
+        for name, value in changes.get(place, {}).items():
             tag = _with(tag, name, value)
-        if number in new:
+        if place in renamed:
+            if not tag.endswith("/>"):
+                raise ValueError(f"its {found[place].name} has an end tag: write it as <… />")
+            tag = f"<{renamed[place]}{tag[1 + len(found[place].name) :]}"
+        if place in new:
             line = raw.rfind(b"\n", 0, start) + 1
             blank = raw[line:start].decode()
             indent = f"\n{blank if not blank.strip() else ''}  "
-            tag = f"{tag}{indent}{new[number]}"
+            tag = f"{tag}{indent}{new[place]}"
         raw = raw[:start] + tag.encode() + raw[stop:]
     return raw.decode()
 
