@@ -17,9 +17,9 @@ class Mistake(NamedTuple):
     - `family`: what it belongs to in the report.
     - `velocity`: `True` where the log must have a velocity column beside the position, `False`
       where it must not, `None` where either will do.
-    - `rescaling`: every signal is scaled as if the units were others. Nothing states them, so that no
-      contradiction is left and only the magnitude could tell; or the names do, and the values are in
-      these units.
+    - `rescaling`: every signal is scaled as if the units were others. Nothing states them, so that
+      no contradiction is left and only the magnitude could tell; or the names do, and the values
+      are in these units.
     - `effects`: names under which an explanation may rightly find it.
     - `held_out`: applied to the held-out log alone.
     """
