@@ -4,6 +4,7 @@ import gc
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 # One worker a core: more threads for small matrices would only wait for each other.
@@ -56,6 +57,9 @@ settings.load_profile("jaxfric")
 # Every compiled program takes some thousand of the 65 530 memory maps that Linux gives a process by
 # default; the next compilation after the last of them aborts the process.
 MOST_MAPS = 15_000
+# Counting the maps takes some 20 ms; a quicker test has compiled next to nothing.
+INSTANT = 0.1
+BEGAN = pytest.StashKey[float]()
 
 
 def memory_maps() -> int:
@@ -63,8 +67,15 @@ def memory_maps() -> int:
     return maps.read_bytes().count(b"\n") if maps.exists() else 0
 
 
-def pytest_runtest_teardown(held=[0]):  # noqa: B006
+def pytest_runtest_setup(item):
+    """Note when the test began."""
+    item.stash[BEGAN] = time.perf_counter()
+
+
+def pytest_runtest_teardown(item, held=[0]):  # noqa: B006
     """After a test, compiled programs are let go where many have come since the last time."""
+    if time.perf_counter() - item.stash.get(BEGAN, 0.0) < INSTANT:
+        return
     if memory_maps() > held[0] + MOST_MAPS:
         jax.clear_caches()
         gc.collect()
