@@ -9,7 +9,8 @@ import pytest
 from jaxfric import models
 from jaxfric.terms.effects import EFFECTS
 from jaxfric.validation import concealed
-from jaxfric.validation.concealed import drawing, tuning
+from jaxfric.validation.concealed import definitions, drawing, tuning
+from jaxfric.validation.concealed.definitions import DEFINITIONS, half_of
 from jaxfric.validation.concealed.kinds import PHYSICS
 from jaxfric.validation.concealed.nominal import friction, rms
 from jaxfric.validation.concealed.tuning import in_loop
@@ -197,3 +198,123 @@ def test_a_loop_that_bursts_however_slow_is_said(monkeypatch):
         concealed.draw(3, ("backlash",))
     assert len(tried) > 1
     assert tried == sorted(tried, reverse=True)
+
+
+# Definitions
+
+
+def test_most_effects_have_a_definition_that_is_only_scored_and_none_changes_sides():
+    halves = {d.half for d in DEFINITIONS}
+    assert halves == {"development", "scored"}
+    assert len({(d.of, d.name) for d in DEFINITIONS}) == len(DEFINITIONS)
+    assert {d.of for d in DEFINITIONS} <= {*concealed.names(), "stick", "log"}
+    assert {d for h in halves for d in definitions.definitions(h)} == set(DEFINITIONS)
+    # As they stood before any of them was asked for.
+    assert half_of("actuator_saturation", "clip") == half_of("stick", "bristles") == "scored"
+    assert half_of("actuator_saturation", "tanh") == half_of("stick", "smooth") == "development"
+
+
+def test_the_usual_definition_is_what_is_drawn_where_none_is_asked_for():
+    plain = concealed.draw(5, ("cogging",))
+    assert plain.truth["cogging"]["definition"] == "harmonics"
+    assert concealed.draw(5, ("cogging",), definitions={"cogging": "harmonics"}) == plain
+    bump = concealed.draw(5, ("stribeck",)).truth["stribeck"]
+    assert bump["definition"] == bump["shape"]
+    asked = concealed.draw(5, ("stribeck",), definitions={"stribeck": "exponential"})
+    assert asked.truth["stribeck"]["shape"] == "exponential"
+    assert (
+        concealed.draw(5, ("gravity_unbalance",)).truth["gravity_unbalance"]["definition"] == "law"
+    )
+
+
+def test_a_definition_that_is_not_there_is_said():
+    with pytest.raises(ValueError, match=r"No definition round of cogging; there are harmonics"):
+        concealed.draw(5, ("cogging",), definitions={"cogging": "round"})
+    with pytest.raises(ValueError, match="of cogging, which is not concealed"):
+        concealed.draw(5, definitions={"cogging": "triangle"})
+
+
+def by_definition(of, name, seed=101):
+    """A machine by one definition."""
+    effects = () if of in ("stick", "log") else (of,)
+    return concealed.draw(seed, effects, SIZE, {of: name})
+
+
+def settled(machine, run, of):
+    """The size of the force in the run, and the residual beyond it, in parts of the noise."""
+    hidden = run.hidden[of]
+    return rms(hidden) / machine.coulomb, rms(slip_residual(machine, run)) / expected_noise(machine)
+
+
+@pytest.mark.parametrize(
+    ("of", "name"),
+    [
+        ("load_dependent_friction", "reaction"),
+        ("cogging", "triangle"),
+        ("thermal_drift", "work"),
+        ("friction_step", "ramp"),
+    ],
+)
+def test_an_effect_by_another_definition_is_as_large_as_drawn(of, name):
+    machine = by_definition(of, name)
+    size, residual = settled(machine, concealed.record(machine), of)
+    assert 0.6 * SIZE < size < 1.6 * SIZE and residual < 1.4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "which",
+    [d for d in DEFINITIONS if d.of not in ("stick", "log")],
+    ids=lambda d: f"{d.of}-{d.name}",
+)
+def test_every_definition_is_physics_that_explains_the_force(which):
+    machine = by_definition(which.of, which.name)
+    run = concealed.record(machine)
+    size, residual = settled(machine, run, which.of)
+    assert np.isfinite(size) and size > 0.3 * SIZE
+    assert np.isfinite(run.hidden_holdout[which.of]).all()
+    # A logger's delay belongs to the position, along which the force has been late.
+    assert residual < 1.4 or which.kind.logged is not None
+
+
+def test_a_hard_limit_is_met_and_never_passed():
+    machine = by_definition("actuator_saturation", "clip")
+    run = concealed.record(machine)
+    knee, command = machine.physics["knee"], np.asarray(run.true[0].force)
+    arrived = command - run.hidden["actuator_saturation"]
+    moving = np.abs(run.true[0].velocity) > 0.05 * np.quantile(np.abs(run.true[0].velocity), 0.98)
+    assert np.max(np.abs(command)) > knee
+    assert np.max(np.abs(arrived[moving])) < 1.001 * knee
+
+
+def test_a_smooth_friction_creeps_where_the_exact_one_sticks():
+    rests = []
+    for name in ("exact", "smooth"):
+        machine = by_definition("stick", name, seed=106)
+        velocity = concealed.record(machine).true[0].velocity
+        rests.append(np.mean(velocity == 0.0))
+    assert rests[0] > 0.01 and rests[1] < 0.1 * rests[0]
+
+
+def test_the_log_alone_holds_a_position_and_filters_a_velocity():
+    plain, held, drive = (
+        concealed.record(by_definition("log", name))
+        for name in ("position", "held_position", "filtered_velocity")
+    )
+    position = np.asarray(plain.recording.position)
+    np.testing.assert_array_equal(plain.recording.force, held.recording.force)
+    np.testing.assert_array_equal(
+        held.recording.position, position[np.arange(position.size) // 3 * 3]
+    )
+    velocity, true = np.asarray(drive.recording.velocity), drive.true[0].velocity
+    assert rms(velocity - true) < 0.1 * rms(true)
+    assert np.corrcoef(velocity[1:], true[:-1])[0, 1] > np.corrcoef(velocity[:-1], true[1:])[0, 1]
+
+
+def test_a_loggers_delay_is_not_felt_by_the_axis():
+    machine = by_definition("transport_delay", "timestamp")
+    late, delay = concealed.record(machine), machine.truth["transport_delay"]["delay"]
+    run = concealed.record(dataclasses.replace(machine, effects=(), truth={}))
+    np.testing.assert_array_equal(run.recording.force, late.recording.force)
+    clock, position = np.asarray(run.recording.time), np.asarray(run.recording.position)
+    np.testing.assert_allclose(late.recording.position, np.interp(clock - delay, clock, position))

@@ -438,3 +438,88 @@ def test_two_real_cases(tmp_path, capsys):
     assert all(set(a["run"]) == {"before", "after"} for a in answers)
     for told in answers[1]["findings"]:
         assert all(len(p["interval"]) == 2 for p in told["parameters"].values())
+
+
+# By definition, and calibration
+
+
+def test_definitions_take_turns_on_the_same_machines():
+    cases = proof.plan(160, 4, RANGE, "all")
+    assert cases[:40] == proof.plan(40, 4, RANGE, "all")
+    singles = [c for c in cases if c.kind == "single"]
+    assert len(singles) == 120 and all(c.effects == (c.definitions[0][0],) for c in singles)
+    assert all(c.definitions[0][0] in ("stick", "log") for c in cases if c.kind == "healthy")
+    machines: dict = {}
+    for c in cases:
+        machines.setdefault(c.definitions[0][0], {}).setdefault(c.definitions[0][1], []).append(
+            c.seed
+        )
+    gaps = list(machines["backlash"].values())
+    assert len(gaps) == 4 and len({seeds[0] for seeds in gaps}) == 1
+    half = {c.definitions for c in proof.plan(160, 4, RANGE, "scored")}
+    assert (("actuator_saturation", "clip"),) in half and (("backlash", "two_mass"),) not in half
+    with pytest.raises(ValueError, match="give all, development or scored"):
+        proof.plan(8, 4, RANGE, "other")
+
+
+def defined(of, name, *findings, verdict="explained", kind="single"):
+    effects = () if kind == "healthy" else (of,)
+    truth = {"truth": {of: {"size": 0.1, "definition": name}} if effects else {}}
+    which = proof.Case("00001", kind, 7, effects, RANGE, ((of, name),))
+    return scoring.score(which, truth, answer(*findings, verdict=verdict))
+
+
+def test_scores_are_told_by_definition_and_half():
+    scores = [
+        defined("backlash", "two_mass", finding("backlash")),
+        defined("backlash", "ideal_play", finding("presliding", "backlash")),
+        defined("backlash", "ideal_play", verdict="consistent"),
+        defined("stick", "smooth", verdict="consistent", kind="healthy"),
+    ]
+    rows = {(r["of"], r["definition"]): r for r in proof.results(scores)["by_definition"]}
+    play = rows["backlash", "ideal_play"]
+    assert (play["half"], play["cases"], play["exact"], play["within"]) == ("scored", 2, 0, 1)
+    assert play["verdicts"] == {"consistent": 1, "explained": 1}
+    assert play["otherwise"] == ["presliding"]
+    assert rows["stick", "smooth"]["exact"] == 1 and rows["single", "all"]["half"] == "scored"
+    text = proof.report(scores, "jaxfric prove")
+    assert "## By physical definition" in text and "| scored | backlash | ideal_play | 2 |" in text
+    assert "## By physical definition" not in proof.report(scores[:1], "jaxfric prove")
+
+
+def test_findings_are_counted_by_how_sure_they_are():
+    def said(name, p, confirmed, *alike, **parameters):
+        more = {"p_value": p, "share": 0.2, "confirmed": confirmed}
+        return finding(name, *alike, **parameters) | more
+
+    truth = sealed(cogging={"amplitude": 1.0})
+    cases = [
+        answer(said("cogging", 0.002, True, amplitude=(1.05, 0.1))),
+        answer(said("spring", 0.002, None, "cogging")),
+        answer(said("spring", 0.02, False)),
+    ]
+    scores = [scoring.score(case("cogging"), truth, each) for each in cases]
+    healthy = scoring.score(case(kind="healthy"), sealed(), cases[0])
+    rows = {row["of"]: row for row in proof.results([*scores, healthy])["reliability"]}
+    assert rows["all"]["findings"] == 4 and rows["all"]["true"] == 1 and rows["all"]["within"] == 2
+    assert rows["p up to 0.003"]["findings"] == 3 and rows["p up to 0.03"]["true"] == 0
+    assert rows["p up to 0.003"]["mean"] == pytest.approx(0.002)
+    assert rows["held-out recording: confirmed"]["findings"] == 2
+    assert rows["other names declared"] == {
+        "findings": 1, "of": "other names declared", "true": 0, "within": 1
+    }  # fmt: skip
+    (cogging, every) = proof.results(scores)["coverage"]
+    assert cogging["effect"] == "cogging" and (cogging["intervals"], cogging["held"]) == (1, 1)
+    assert every["effect"] == "all"
+    assert "## How sure, and how often true" in proof.report(scores, "jaxfric prove")
+
+
+def test_what_came_out_stands_beside_what_was_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(running, "work", lambda cases, *_: iter(()))
+    proof.run(tmp_path, 3, 1, RANGE, half="scored")
+    proof.conclude(tmp_path, proof.results([]))
+    kept = trials.read(tmp_path / "proof.json")
+    assert kept["definitions"] == "scored" and kept["results"]["cases"] == 0
+    proof.run(tmp_path, 5, 1, RANGE, half="scored")
+    with pytest.raises(ValueError, match="seed 1 .* and definitions scored"):
+        proof.run(tmp_path, 3, 1, RANGE)

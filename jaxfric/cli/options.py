@@ -253,6 +253,12 @@ def proving(command: ArgumentParser) -> None:
         help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",
     )
     command.add_argument(
+        "--definitions",
+        choices=("all", "development", "scored"),
+        help="conceal each effect by several definitions of its physics: all, those that are "
+        "developed on, or those that are only scored (default: the usual one)",
+    )
+    command.add_argument(
         "--limit",
         type=seconds,
         default=600.0,

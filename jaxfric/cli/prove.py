@@ -15,8 +15,9 @@ def run(arguments: Namespace) -> int:
     folder, size = Path(arguments.out), arguments.size
     options = (arguments.cases, arguments.seed, size, arguments.jobs, _configure, arguments.limit)
     with working(f"proving in {folder}") as doing:
-        cases = proof.run(folder, *options, doing)
+        cases = proof.run(folder, *options, doing, arguments.definitions or "")
     scores = proof.scores(folder, cases)
+    proof.conclude(folder, proof.results(scores))
     try:
         pictures, missing = proof.draw(scores, folder), ""
     except ValueError as error:
@@ -25,8 +26,10 @@ def run(arguments: Namespace) -> int:
         f"jaxfric prove --cases {arguments.cases} --seed {arguments.seed} "
         f"--size {size[0]:g}:{size[1]:g}"
     )
+    if arguments.definitions:
+        command += f" --definitions {arguments.definitions}"
     write_text(folder / "report.md", proof.report(scores, command, pictures))
     say(proof.short(scores))
-    written = ", ".join(["report.md", *pictures, "sealed/", "answers/"])
+    written = ", ".join(["proof.json", "report.md", *pictures, "sealed/", "answers/"])
     say(f"\nWritten to {folder}: {written}{missing}")
     return 0

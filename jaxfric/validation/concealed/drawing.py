@@ -3,11 +3,12 @@
 import copy
 import dataclasses
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.random import Generator
 
+from .definitions import LOG, STICK, definition, usual
 from .kinds import kind
 from .machines import (
     SHAPES,
@@ -23,6 +24,7 @@ from .machines import (
 )
 from .nominal import Kind, nominal
 from .physics import ABSENT
+from .sticking import sticking
 from .tuning import BURST, tune
 
 # How often a loop that bursts is made half as fast before it is given up.
@@ -30,7 +32,10 @@ _SLOWER = 4
 
 
 def draw(
-    seed: int, effects: Sequence[str] = (), size: float | tuple[float, float] = (0.02, 0.30)
+    seed: int,
+    effects: Sequence[str] = (),
+    size: float | tuple[float, float] = (0.02, 0.30),
+    definitions: Mapping[str, str] | None = None,
 ) -> Machine:
     """A machine drawn at random, with the effects named concealed in it.
 
@@ -39,15 +44,16 @@ def draw(
     [`names`][] or [`OUTSIDE`][]; `size`, the root mean square of an effect's force over the
     set-point's motion in parts of the Coulomb level: one number, or the range of a log-uniform
     draw. What would not be physical any more is not made, so that the size in `Machine.truth` can
-    be smaller.
+    be smaller; `definitions`, of an effect, `stick` or `log`: by which physics, where that is not
+    the usual.
 
     A loop that bursts with the effect is made slower.
 
     **Raises:** `ValueError` for an effect that there is none of, or one named twice, or for a loop
     that bursts however slow.
     """
-    effects = tuple(effects)
-    kinds = _checked(effects)
+    effects, asked = tuple(effects), dict(definitions or {})
+    kinds = _checked(effects, asked)
     rng = np.random.default_rng((seed, 0))
     plan = draw_plan(rng, seed)
     time = np.arange(plan.samples) / plan.sample_rate
@@ -73,8 +79,11 @@ def draw(
         hardest = mass * float(np.quantile(np.abs(np.gradient(v, time)), 0.999))
         physics["limit"] = 8 * coulomb + 3 * hardest
         blur = draw_noise(rng, coulomb, noise)
-        healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {})
-        return _with(healthy, effects, nominal(time, x, v, coulomb, physics, plan), size)
+        n = nominal(time, x, v, coulomb, physics, plan)
+        physics = physics | sticking(asked.get(STICK, ""), n)
+        own = {of: asked[of] for of in (STICK, LOG) if of in asked}
+        healthy = Machine(seed, (), baseline, coulomb, physics, plan, blur, {}, own)
+        return _with(healthy, effects, n._replace(physics=physics), size, asked)
 
     for _ in range(_SLOWER):
         machine = driven(copy.deepcopy(rng), omega)
@@ -85,21 +94,26 @@ def draw(
     raise ValueError(f"The loop of machine {seed} with {', '.join(effects)} bursts.")
 
 
-def _with(machine: Machine, effects, n, size) -> Machine:
+def _with(machine: Machine, effects, n, size, asked) -> Machine:
     """The machine with effects, one after the other: each knows the friction of those before."""
     for name in effects:
-        truth = _conceal(machine, name, n, size)
-        physics = {**machine.physics, **kind(name).physics(truth, machine.physics)}
+        truth = _conceal(machine, name, n, size, asked.get(name, ""))
+        own = kind(name, truth["definition"])
+        physics = {**machine.physics, **own.physics(truth, machine.physics)}
         both = (*machine.effects, name), {**machine.truth, name: truth}
         machine = dataclasses.replace(machine, effects=both[0], physics=physics, truth=both[1])
         n = n._replace(physics=physics)
     return machine
 
 
-def _checked(effects) -> list[Kind]:
+def _checked(effects, asked) -> list[Kind]:
     if len(set(effects)) < len(effects):
         raise ValueError(f"An effect is named twice: {', '.join(effects)}.")
-    return [kind(name) for name in effects]
+    for of, name in asked.items():
+        definition(of, name)
+        if of not in (*effects, STICK, LOG):
+            raise ValueError(f"Definition {name} of {of}, which is not concealed: name it.")
+    return [kind(name, asked.get(name, "")) for name in effects]
 
 
 def _shape(rng: Generator, kinds: Sequence[Kind]) -> str | None:
@@ -126,11 +140,13 @@ def _mass(rng: Generator, v, time, coulomb, kinds) -> float:
     return ratio * coulomb / float(np.quantile(np.abs(np.gradient(v, time)), 0.98))
 
 
-def _conceal(machine, name, n, size):
+def _conceal(machine, name, n, size, by):
     rng = np.random.default_rng((machine.seed, 1, zlib.crc32(name.encode())))
     low, high = size if isinstance(size, tuple) else (size, size)
-    own, wanted = kind(name), log_uniform(rng, low, high)
+    own, wanted = kind(name, by), log_uniform(rng, low, high)
     truth = own.draw(rng, n, wanted)
+    forms = (str(truth.get(key, "")) for key in ("shape", "form"))
+    truth["definition"] = by or usual(name, next((form for form in forms if form), ""))
     if own.tuned:
         truth = tune(machine, name, truth, n, wanted)
     return {"size": own.measure(truth, n), **truth, "where": own.where(truth)}

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from ...terms.effect import ANY
 from ...terms.effects import EFFECTS
 from . import curves, memories, places, schedule
+from .definitions import DEFINITIONS
 from .nominal import Kind
 from .own import by_law
 
@@ -27,11 +28,14 @@ def names() -> tuple[str, ...]:
     return (*known, *(name for name in others if name not in PHYSICS))
 
 
-def kind(name: str) -> Kind:
-    """How an effect is concealed.
+def kind(name: str, by: str = "") -> Kind:
+    """How an effect is concealed, by one of its definitions, or as it usually is.
 
     **Raises:** `ValueError`, with the names there are, for one that cannot be.
     """
+    found = next((d.kind for d in DEFINITIONS if (d.of, d.name) == (name, by)), None)
+    if found is not None:
+        return found
     if name in PHYSICS:
         return PHYSICS[name]
     if name in EFFECTS and EFFECTS[name].shapes(ANY):

@@ -63,7 +63,9 @@ class Machine:
     - `physics`: the simulator's parameters, by the names of `concealed.physics.ABSENT`.
     - `plan`, `noise`: how it is recorded.
     - `truth`: for each effect its parameters, `size` (root mean square of its force over the
-      set-point's motion in parts of `coulomb`) and `where` it acts, a sentence.
+      set-point's motion in parts of `coulomb`), `where` it acts, a sentence, and the
+      `definition` of the physics that made it.
+    - `definitions`: how it sticks and is logged, where that is not the usual.
     """
 
     seed: int
@@ -74,6 +76,7 @@ class Machine:
     plan: Plan
     noise: Noise
     truth: Mapping[str, Mapping[str, Any]]
+    definitions: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 SHAPES = ("gaussian", "lorentzian", "exponential")

@@ -82,7 +82,9 @@ class Kind(NamedTuple):
     friction; `total(truth, nominal)`, all of it, where `force` is a part; `planted`, it is one of
     the recorded position, velocity and time alone; `added`, to the force of a machine that moves as
     it would without. `over(truth, nominal, run)`: what acts because of the time; `unrepeated`, in
-    each run at moments of its own; `channels(truth, plan, run, clock)` that record it.
+    each run at moments of its own; `channels(truth, plan, run, clock)` that record it. With
+    `logged(truth, clock, signal)`, it is the logger that makes of the position what this says, and
+    the axis feels nothing.
     """
 
     draw: Callable[[Generator, Nominal, float], Truth]
@@ -106,6 +108,7 @@ class Kind(NamedTuple):
     total: Callable[[Truth, Nominal], np.ndarray] | None = None
     over: Callable[[Truth, Nominal, int], Columns] | None = None
     channels: Callable[[Truth, Plan, int, np.ndarray], dict[str, np.ndarray]] | None = None
+    logged: Callable[[Truth, np.ndarray, np.ndarray], np.ndarray] | None = None
 
     def measure(self, truth: Truth, nominal: Nominal) -> float:
         """The size: root mean square of the force in parts of the Coulomb level."""
@@ -126,8 +129,9 @@ def rms(x: np.ndarray) -> float:
 def bump(physics: Mapping[str, float], speed: np.ndarray, way: np.ndarray) -> np.ndarray:
     """The Stribeck bump at speeds, m/s, in directions: its magnitude, N."""
     ratio = speed / np.where(way > 0, physics["bump_speed+"], physics["bump_speed-"])
-    shape = (np.exp(-(ratio**2)), 1 / (1 + ratio**2), np.exp(-ratio))[int(physics["bump_shape"])]
-    return np.where(way > 0, physics["bump+"], physics["bump-"]) * shape
+    shapes = np.exp(-(ratio**2)), 1 / (1 + ratio**2), np.exp(-ratio), np.exp(-np.sqrt(ratio))
+    height = np.where(way > 0, physics["bump+"], physics["bump-"])
+    return height * shapes[int(physics["bump_shape"])]
 
 
 def friction(physics: Mapping[str, float], v: np.ndarray, way: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ ABSENT = {
     "mass": 1.0, "offset": 0.0,
     "coulomb+": 1.0, "viscous+": 0.0, "bump+": 0.0, "bump_speed+": 1.0,
     "coulomb-": 1.0, "viscous-": 0.0, "bump-": 0.0, "bump_speed-": 1.0,
-    "bump_shape": 0.0,  # 0 Gaussian, 1 Lorentzian, 2 exponential
+    "bump_shape": 0.0,  # 0 Gaussian, 1 Lorentzian, 2 exponential, 3 exponent a half
     # friction of another kind
     "drag": 0.0, "thinning": 0.0, "thinning_speed": 1.0,
     "power": 0.0, "power_speed": 1.0, "exponent": 1.0,
@@ -46,9 +46,20 @@ ABSENT = {
     # second body behind a spring, with a gap
     "load_share": 0.0, "load_friction_share": 0.0,
     "stiffness": 0.0, "damping": 0.0, "half_gap": 0.0,
+    # further definitions, of `variants`
+    "smooth_speed": 0.0, "presliding_shape": 0.0, "bristle_damping": 0.0, "lag_stages": 1.0,
+    "deadband_shape": 0.0, "saturation_shape": 0.0, "reaction_friction": 0.0,
+    "triangle": 0.0, "second": 0.0, "pitch2": 1.0, "cogging2_phase": 0.0, "ripple": 0.0,
+    "play": 0.0, "play_share": 0.0, "play_friction_share": 0.0,
     # loop and sensor
     "kp": 0.0, "ki": 0.0, "kd": 0.0, "velocity_filter": 1.0, "limit": np.inf, "resolution": 1.0,
 }  # fmt: skip
+
+# Those that need the larger program.
+FURTHER = (
+    "smooth_speed", "presliding_shape", "lag_stages", "deadband_shape", "saturation_shape",
+    "triangle", "second", "ripple", "play",
+)  # fmt: skip
 
 
 def run(parameters: list[dict[str, float]], inputs: list[Inputs], substeps: int) -> list[Motion]:
@@ -63,13 +74,14 @@ def run(parameters: list[dict[str, float]], inputs: list[Inputs], substeps: int)
     if unknown:
         raise ValueError(f"The simulator has no parameter {', '.join(sorted(unknown))}.")
     two = bool(np.any(scalars["load_share"] > 0))
+    more = any(np.any(scalars[name] != ABSENT[name]) for name in FURTHER)
     with jax.enable_x64(True):
-        found = _runs(scalars, columns, np.int32(count), np.int32(substeps), two)
+        found = _runs(scalars, columns, np.int32(count), np.int32(substeps), two, more)
         host = [np.asarray(x)[:, :count] for x in found]
     return [Motion(*(x[i] for x in host)) for i in range(len(inputs))]
 
 
-@partial(jax.jit, static_argnames="two")
-def _runs(scalars, columns, count, substeps, two):
-    each = jax.vmap(partial(one, two=two), in_axes=(0, 0, None, None))
+@partial(jax.jit, static_argnames=("two", "more"))
+def _runs(scalars, columns, count, substeps, two, more):
+    each = jax.vmap(partial(one, two=two, more=more), in_axes=(0, 0, None, None))
     return each(scalars, columns, count, substeps)

@@ -7,9 +7,11 @@ import numpy as np
 
 from ...data.recording import Recording
 from . import physics
+from .definitions import LOG
 from .kinds import kind
 from .machines import Machine, reference
-from .nominal import Columns, Nominal, direction, rms
+from .nominal import Columns, Kind, Nominal, direction, rms
+from .others import low_pass
 
 
 class Run(NamedTuple):
@@ -62,7 +64,8 @@ def simulate(runs: Sequence[tuple[Machine, int]]) -> list[Simulated]:
         hidden = _hide(machine, clocks[i], true[i], staged[i][1], run)
         added = _added(machine, clocks[i], true[i])
         force = sum(added.values(), true[i].force)
-        found.append(Simulated(clocks[i], inputs[i], true[i]._replace(force=force), hidden | added))
+        seen, late = _logged(machine, clocks[i], true[i]._replace(force=force))
+        found.append(Simulated(clocks[i], inputs[i], seen, hidden | added | late))
     return found
 
 
@@ -111,12 +114,16 @@ def _stage(machine: Machine, run: int, clock: np.ndarray):
     return physics.Inputs(*columns), timed.load
 
 
+def _kind(machine: Machine, name: str) -> Kind:
+    return kind(name, machine.truth[name].get("definition", ""))
+
+
 def _timed(machine: Machine, n: Nominal, run: int) -> Columns:
     """What acts over a run because of the time; `n` needs the run's `time` and `plan` only."""
     zero = np.zeros_like(n.time)
     total = Columns(zero, zero, zero)
     for name, truth in machine.truth.items():
-        over = kind(name).over
+        over = _kind(machine, name).over
         if over is not None:
             total = Columns(*(a + b for a, b in zip(total, over(truth, n, run), strict=True)))
     return total
@@ -136,10 +143,11 @@ def _hide(machine: Machine, clock, true: physics.Motion, load, run):
 
     Two such effects at once share it: each is given half.
     """
-    names = [name for name in machine.effects if not kind(name).added]
+    kinds = {name: _kind(machine, name) for name in machine.effects}
+    names = [name for name, own in kinds.items() if not own.added and own.logged is None]
     n = _driven(machine, clock, true)
-    known = {name: _known(name, machine, n, run) for name in names if kind(name).follows}
-    inside = [known[name] for name in names if kind(name).inside]
+    known = {name: _known(name, machine, n, run) for name in names if kinds[name].follows}
+    inside = [known[name] for name in names if kinds[name].inside]
     total = sum(inside, true.hidden + load)
     if len(names) == 1:
         return {names[0]: total}
@@ -150,11 +158,26 @@ def _hide(machine: Machine, clock, true: physics.Motion, load, run):
 
 def _added(machine: Machine, clock, true: physics.Motion) -> dict[str, np.ndarray]:
     """The force of each effect that the machine's motion does not feel."""
-    names = [name for name in machine.effects if kind(name).added]
-    if not names:
+    kinds = {name: _kind(machine, name) for name in machine.effects}
+    kinds = {name: own for name, own in kinds.items() if own.added}
+    if not kinds:
         return {}
     n = _driven(machine, clock, true)._replace(u=true.force)
-    return {name: kind(name).force(machine.truth[name], n) for name in names}
+    return {name: own.force(machine.truth[name], n) for name, own in kinds.items()}
+
+
+def _logged(machine: Machine, clock, true: physics.Motion):
+    """The run with the position as the logger has it, and the force of each effect that is its.
+
+    What the logged position needs is the force as late as it is.
+    """
+    hidden = {}
+    for name, truth in machine.truth.items():
+        logged = _kind(machine, name).logged
+        if logged is not None:
+            hidden[name] = true.force - logged(truth, clock, true.force)
+            true = true._replace(counted=logged(truth, clock, true.counted))
+    return true, hidden
 
 
 def _driven(machine, clock, true):
@@ -167,7 +190,7 @@ def _driven(machine, clock, true):
 
 
 def _known(name, machine, n, run):
-    truth, own = machine.truth[name], kind(name)
+    truth, own = machine.truth[name], _kind(machine, name)
     if own.over is not None:
         load, coulomb, viscous = own.over(truth, n, run)
         return load + coulomb * n.way + viscous * n.v
@@ -179,10 +202,25 @@ def _log(machine: Machine, found: Simulated, run: int) -> Recording:
     force = machine.noise.force * _rng(machine, run, 3).normal(size=clock.size)
     channels = {"reference": found.inputs.goal}
     for effect, truth in machine.truth.items():
-        recorded = kind(effect).channels
+        recorded = _kind(machine, effect).channels
         for role, signal in recorded(truth, machine.plan, run, clock).items() if recorded else ():
             noise = 1e-3 * rms(signal) * _rng(machine, run, 4).normal(size=clock.size)
             channels[role] = signal + noise
     name = f"machine {machine.seed}, {('identification', 'held out')[run]}"
-    true = found.true
-    return Recording(clock, true.force + force, true.counted, channels=channels, source=name)
+    true, logged = found.true, machine.definitions.get(LOG, "")
+    position, velocity = true.counted, None
+    if logged == "held_position":
+        position = position[np.arange(clock.size) // HELD * HELD]
+    elif logged == "filtered_velocity":
+        velocity = _by_drive(machine, clock, position)
+    return Recording(clock, true.force + force, position, velocity, channels=channels, source=name)
+
+
+# So many samples of the force to one of the position, where the log holds that.
+HELD = 3
+
+
+def _by_drive(machine: Machine, clock: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """The velocity that the drive's own loop works with."""
+    rate = np.diff(counted, prepend=counted[0]) / np.diff(clock, prepend=2 * clock[0] - clock[1])
+    return low_pass(rate, np.full(clock.size, machine.physics["velocity_filter"]))

@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from . import variants
+
 LONGEST = 65536  # samples that fit into the compiled program
 
 
@@ -47,7 +49,10 @@ class _Body(NamedTuple):
 
 
 class _Memory(NamedTuple):
-    """State beside the bodies: actuator, bristles, lagged speed (twice), smoothed acceleration."""
+    """State beside the bodies: actuator, bristles, lagged speed (twice), smoothed acceleration.
+
+    With `variants`: a second stage of the actuator, LuGre's bristle and its rate, Maxwell slip.
+    """
 
     force: jax.Array
     bristle: jax.Array
@@ -55,6 +60,10 @@ class _Memory(NamedTuple):
     speed1: jax.Array
     speed2: jax.Array
     acceleration: jax.Array
+    force2: jax.Array | None = None
+    before: jax.Array | None = None
+    rate: jax.Array | None = None
+    elements: jax.Array | None = None
 
 
 class _Level(NamedTuple):
@@ -63,11 +72,18 @@ class _Level(NamedTuple):
     base: jax.Array
 
 
-def one(p, inputs, count, substeps, two):
-    """One run with scalar parameters `p`: every [`Motion`][] padded to `LONGEST`."""
+def one(p, inputs, count, substeps, two, more):
+    """One run with scalar parameters `p`: every [`Motion`][] padded to `LONGEST`.
+
+    `two`: with a second body; `more`: with the further definitions of `variants`.
+    """
     zero = jnp.zeros(())
     start = _Body(inputs.goal[0], inputs.goal_speed[0])
-    memory = _Memory(zero, jnp.sign(start.velocity), jnp.sign(start.velocity), zero, zero, zero)
+    way = jnp.sign(start.velocity)
+    memory = _Memory(zero, way, way, zero, zero, zero)
+    if more:
+        slipping = jnp.full(len(variants.ELEMENTS), way)
+        memory = memory._replace(force2=zero, before=way, rate=zero, elements=slipping)
     loop = (start.position, start.velocity, zero)
     outputs = Motion(*(jnp.zeros(LONGEST) for _ in Motion._fields))
 
@@ -79,7 +95,7 @@ def one(p, inputs, count, substeps, two):
         forces = outputs.force.at[k].set(command)
         acting = _late(p, forces, k, motor.position, now.interval)
         motor, load, memory, hidden = _advance(
-            p, (motor, load, memory), now, command, acting, substeps, two
+            p, (motor, load, memory), now, command, acting, substeps, two, more
         )
         fresh = (command, counted, carry[0].position, carry[0].velocity, hidden)
         rows = zip(outputs[1:], fresh[1:], strict=True)
@@ -111,7 +127,7 @@ def _late(p, forces, k, position, interval):
     return older, newer, samples - whole
 
 
-def _advance(p, state, now, command, acting, substeps, two):
+def _advance(p, state, now, command, acting, substeps, two, more):
     parts = substeps.astype(now.interval.dtype)
     span = now.interval / parts
     older, newer, takeover = acting
@@ -123,7 +139,10 @@ def _advance(p, state, now, command, acting, substeps, two):
         motor, load, memory, total = carry
         force = jnp.where((i.astype(parts.dtype) + 0.5) / parts >= takeover, newer, older)
         memory = _remember(p, memory, motor, force, keep, slow, span)
-        motor, load, memory, hidden = _kick(p, motor, load, memory, now, span, two)
+        if more:
+            level = _dry(p, jnp.sign(motor.velocity), jnp.abs(motor.velocity))
+            memory = variants.remember(p, memory, motor.velocity, keep, span, level)
+        motor, load, memory, hidden = _kick(p, motor, load, memory, now, span, two, more)
         return motor, load, memory, total + hidden
 
     motor, load, memory, total = jax.lax.fori_loop(0, substeps, substep, (*state, jnp.zeros(())))
@@ -152,29 +171,53 @@ def _delivered(p, force):
     return jnp.sign(force) * size / jnp.where(force > 0, 1 + p["gain"], 1.0)
 
 
-def _kick(p, motor, load, memory, now, span, two):
+def _dry(p, way, speed):
+    """Dry friction at a speed, and its part without the bump, N."""
+    coulomb = _side(p, "coulomb", way)
+    return coulomb + _side(p, "bump", way) * _bump(p, speed, _side(p, "bump_speed", way)), coulomb
+
+
+def _kick(p, motor, load, memory, now, span, two, more):
     """One substep of both bodies, and what stands beside M a + friction + offset in it."""
     middle = motor.position + 0.5 * span * motor.velocity
-    given = _delivered(p, memory.force)
+    given = variants.delivered(p, memory, middle) if more else _delivered(p, memory.force)
     mass, field = _field(p, middle, motor.velocity, memory)
+    if more:
+        field = field + variants.field(p, middle)
     pull, load_after = _second(p, motor, load, now, span) if two else (0.0, load)
     free = given - field - p["offset"] - now.load - pull
     moving = motor.velocity != 0
     way = jnp.where(moving, jnp.sign(motor.velocity), jnp.sign(free))
     level = _friction(p, way, motor.velocity, middle, given, memory, now)
     elastic = p["presliding"] > 0
-    friction = jnp.where(elastic, memory.bristle, way) * level.dry + way * level.wet
+    dry = jnp.where(elastic, memory.bristle, way) * level.dry
+    if more:
+        touching = variants.engaged(p, motor, load, way)
+        alone = 1 - touching
+        mass = mass - alone * p["play_share"] * p["mass"]
+        less = 1 - alone * p["play_friction_share"]
+        level = level._replace(dry=less * level.dry, wet=less * level.wet)
+        elastic = elastic | (p["smooth_speed"] > 0)
+        dry = variants.dry_force(p, way, motor.velocity, memory, level, _side(p, "coulomb", way))
+    friction = dry + way * level.wet
     stuck = ~moving & ~elastic & (jnp.abs(free) <= level.dry + level.wet)
     rate = jnp.where(stuck, 0.0, (free - friction) / mass)
     velocity = motor.velocity + rate * span
     stops = moving & ~elastic & (velocity * motor.velocity < 0)
     velocity = jnp.where(stops, 0.0, velocity)
     rate = (velocity - motor.velocity) / span
+    blow = 0.0
+    if more:
+        place, slower = variants.dragged(p, load, middle, velocity, touching, span)
+        load_after = load_after._replace(
+            position=jnp.where(p["play"] > 0, place, load_after.position)
+        )
+        blow, velocity = (slower - velocity) / span, slower
     after = _Body(middle + 0.5 * span * velocity, velocity)
     # A stuck axis hides any force: its friction counts as the baseline's.
     rests = stuck | stops | (elastic & (jnp.abs(motor.velocity) < p["still"]))
     beyond = jnp.where(rests, 0.0, friction - way * level.base)
-    hidden = field + pull + beyond - given + (mass - p["mass"]) * rate
+    hidden = field + pull + beyond - given + (mass - p["mass"]) * rate - p["mass"] * blow
     smooth = memory.acceleration + (rate - memory.acceleration) * jnp.minimum(span / 2e-3, 1.0)
     return after, load_after, memory._replace(acceleration=smooth), hidden
 
@@ -204,7 +247,9 @@ def _field(p, x, v, memory):
 def _bump(p, speed, width):
     ratio = speed / width
     bell = jnp.where(p["bump_shape"] == 1.0, 1 / (1 + ratio**2), 0.0)
-    decay = jnp.exp(-jnp.where(p["bump_shape"] == 2.0, ratio, ratio**2))
+    power = jnp.where(p["bump_shape"] == 2.0, ratio, ratio**2)
+    power = jnp.where(p["bump_shape"] == 3.0, jnp.sqrt(ratio), power)
+    decay = jnp.exp(-power)
     return jnp.where(p["bump_shape"] == 1.0, bell, decay)
 
 
@@ -236,6 +281,7 @@ def _friction(p, way, v, x, force, memory, now):
         + p["spot"] * spot
         + p["load_friction"] * jnp.abs(force) / (1 + p["load_friction"] * way * jnp.sign(force))
         + p["acceleration_friction"] * fast / (fast + p["acceleration_scale"])
+        + p["reaction_friction"] * p["mass"] * fast
     )
     return _Level(share * dry, share * viscous + extra, base)
 

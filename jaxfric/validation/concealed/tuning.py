@@ -45,7 +45,7 @@ def _improved(machine, name, truth, n, size, step):
     identification's motion; size over parameter is taken as a power law between and, by no more
     than another step, beyond them.
     """
-    kind = kind_of(name)
+    kind = kind_of(name, truth["definition"])
     low, high = kind.bounds(n)
     first = truth[kind.tuned]
     tried = np.clip([first / step, first * step], low, high)
@@ -65,7 +65,7 @@ def _improved(machine, name, truth, n, size, step):
 
 def _sizes(machine, name, truths):
     """Of the effect's force in the closed loop, in parts of the Coulomb level."""
-    kind = kind_of(name)
+    kind = kind_of(name, truths[0]["definition"])
     twins = [
         dataclasses.replace(
             machine,

@@ -11,7 +11,7 @@ from .planning import Case, plan
 from .trials import ANSWERS, SEALED, failed, fingerprint, path, read, trial
 from .workers import work
 
-ABOUT = "proof.json"
+ABOUT, RESULTS = "proof.json", "results"
 # A case takes seconds, a process' first one, which compiles, about a minute: what takes ten is a
 # search that does not end, and no user would wait for it either.
 LIMIT = 600.0
@@ -26,18 +26,20 @@ def run(
     prepare: Callable[[], object] | None = None,
     limit: float = LIMIT,
     doing: Callable[[str], object] = lambda text: None,
+    half: str = "",
 ) -> list[Case]:
     """Do what is left to do of a proof in a folder; returns its cases.
 
-    **Arguments:** `cases`, `seed`, `size`: as [`plan`][jaxfric.validation.proof.plan] takes them;
-    `jobs`: processes; `prepare`: called in each of them first, to configure jax; `limit`: seconds
-    after which a case is given up; `doing`: is told how far it is. A case that is given up, or
-    whose process dies twice, has an answer that says so.
+    **Arguments:** `cases`, `seed`, `size`, `half`: as [`plan`][jaxfric.validation.proof.plan] takes
+    them; `jobs`: processes; `prepare`: called in each of them first, to configure jax; `limit`:
+    seconds after which a case is given up; `doing`: is told how far it is. A case that is given up,
+    or whose process dies twice, has an answer that says so.
 
     **Raises:** `ValueError` if the folder holds a proof of another seed or size.
     """
-    planned = plan(cases, seed, size)
-    claim(folder, {"seed": seed, "size": list(size)})
+    planned = plan(cases, seed, size, half)
+    by_definition = {"definitions": half} if half else {}
+    claim(folder, {"seed": seed, "size": list(size)} | by_definition)
     do = functools.partial(trial, folder=folder)
     do_all(folder, planned, do, jobs, prepare, limit, doing)
     return planned
@@ -72,14 +74,22 @@ def claim(folder: Path, about: dict) -> None:
     file = folder / ABOUT
     if file.is_file():
         there = read(file)
+        there.pop(RESULTS, None)
         if there != about:
+            half = f" and definitions {there['definitions']}" if "definitions" in there else ""
             raise ValueError(
                 f"{file}: is of the proof of seed {there.get('seed')} and sizes "
-                f"{there.get('size')}; give those to go on with it, or another --out."
+                f"{there.get('size')}{half}; give those to go on with it, or another --out."
             )
-    elif any(folder.iterdir()):
+        return
+    if any(folder.iterdir()):
         raise ValueError(f"{folder}: is not empty and holds no proof; give another --out.")
     write_text(file, to_json(about))
+
+
+def conclude(folder: Path, results: dict) -> None:
+    """Write what came out into the file that says what the folder holds."""
+    write_text(folder / ABOUT, to_json(read(folder / ABOUT) | {RESULTS: results}))
 
 
 def _span(seconds: float) -> str:

@@ -33,6 +33,22 @@ class Parameter(NamedTuple):
         return abs(self.found - self.true) / abs(self.true)
 
 
+class Belief(NamedTuple):
+    """One finding: its `effect`, how sure it is, and whether it is `true`.
+
+    `p`: its p-value; `share`: of the residual; `confirmed` by the held-out recording, `None` where
+    that cannot say; `alike`: how many other names it declares; `within`: the truth is among those.
+    """
+
+    effect: str
+    p: float | None
+    share: float | None
+    confirmed: bool | None
+    alike: int
+    true: bool
+    within: bool
+
+
 class Score(NamedTuple):
     """One case, scored.
 
@@ -48,6 +64,8 @@ class Score(NamedTuple):
       effects, if it knows all but one; `run_before`, `run_after`: held-out velocity errors of the
       models run forward.
     - `parameters` that truth and finding both have; `seconds` that `explain` took; `code`.
+    - `definitions`: of each effect, or of how it sticks and is logged, what it is of and its name;
+      `beliefs`: every finding with how sure it is.
     """
 
     name: str
@@ -72,6 +90,8 @@ class Score(NamedTuple):
     parameters: tuple[Parameter, ...] = ()
     seconds: float | None = None
     code: str | None = None
+    definitions: tuple[tuple[str, str], ...] = ()
+    beliefs: tuple[Belief, ...] = ()
 
     @property
     def reached(self) -> float | None:
@@ -124,6 +144,8 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         return first._replace(error=answer["error"] or "the sealed truth is not there")
     truth = sealed["truth"]
     first = first._replace(sizes=tuple(truth[name]["size"] for name in case.effects))
+    drawn = tuple((of, truth[of]["definition"]) for of in truth if "definition" in truth[of])
+    first = first._replace(definitions=drawn or case.definitions)
     if answer["error"] is not None:
         return first._replace(error=answer["error"])
     findings = answer["findings"]
@@ -147,6 +169,20 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         run_before=run.get("before"),
         run_after=run.get("after"),
         parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
+        beliefs=tuple(_belief(finding, wanted) for finding in findings),
+    )
+
+
+def _belief(finding: Mapping[str, Any], wanted: set[str]) -> Belief:
+    effect, alike = finding["effect"], set(finding["confusable_with"])
+    return Belief(
+        effect,
+        finding.get("p_value"),
+        finding.get("share"),
+        finding.get("confirmed"),
+        len(alike),
+        effect in wanted,
+        bool({effect, *alike} & wanted),
     )
 
 

@@ -39,7 +39,7 @@ def trial(case: Case, folder: Path) -> None:
     """Do one case, and write its answer; whatever goes wrong is written as its answer too."""
     code = fingerprint()
     try:
-        machine = draw(case.seed, case.effects, case.size)
+        machine = draw(case.seed, case.effects, case.size, dict(case.definitions))
         write_text(path(folder, SEALED, case), to_json(sealed(case, machine)))
         run = record(machine)
         recording = _nameless(run.recording, case)
@@ -67,6 +67,7 @@ def sealed(case: Case, machine: Machine) -> dict[str, Any]:
         "seed": case.seed,
         "effects": list(case.effects),
         "size": list(case.size),
+        "definitions": dict(case.definitions),
         "coulomb": machine.coulomb,
         "truth": truth,
     }

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..concealed import names
-from . import counting as counted
+from . import calibration, counting as counted, defining
 from .counting import Rate, middle, of_kind, rate
 from .planning import KINDS
 from .scoring import LEAST_REDUCTION, Parameter, Score
@@ -42,6 +42,11 @@ that disturbs. Its answer is written to `answers/`. Scoring opens `sealed/` afte
 - A case that has no answer within the time limit, or whose process dies twice, has gone wrong.
 - Brackets hold the 95 % interval of a share (Wilson). A case that went wrong counts as a miss."""
 
+DEFINED = """\
+The same effect by several definitions of its physics. Those of the half *development* may be looked
+at while the library is worked on, those *scored* are counted and nothing else; which is which
+follows from the table of definitions. A healthy machine is drawn by how it sticks and is logged."""
+
 AGAIN = """\
 `from jaxfric.concealed import draw, record; run = record(draw(SEED, (EFFECTS…), SIZES))` makes the
 recordings of a machine again: its seed and effects are in the table, its range of sizes is the
@@ -74,10 +79,13 @@ def report(
         _power(counted.binned(scores)),
         "## One effect, by effect",
         _power(_by_effect(scores)),
+        *_definitions(scores),
         "## Confusion: true effect by the one named first",
         _confusion(scores),
         "## Parameters of rightly named effects",
         _parameters(counted.parameters(scores)),
+        "## How sure, and how often true",
+        _calibration(scores),
         "## Parameters and reduction of the held-out error, by size",
         _by_size(scores),
         "## Errors on the held-out recording, median",
@@ -164,6 +172,41 @@ def _by_effect(scores: Sequence[Score]) -> list[tuple[str, list[Score]]]:
     single = of_kind(scores, "single")
     found = {name: [s for s in single if s.effects == (name,)] for name in names()}
     return [(name, some) for name, some in found.items() if some]
+
+
+def _definitions(scores: Sequence[Score]) -> list[str]:
+    """Effect by definition, where definitions were asked for or drawn in more than one way."""
+    rows = [
+        (r["half"], r["of"], r["definition"], str(r["cases"]), str(r["exact"]), str(r["within"]),
+         ", ".join(f"{verdict} {n}" for verdict, n in r["verdicts"].items()),
+         ", ".join(r["otherwise"]) or "-")
+        for r in defining.by_definition(scores)
+    ]  # fmt: skip
+    if sum(row[2] != "all" for row in rows) < 2:
+        return []
+    head = ("half", "effect, or what of the machine", "definition", "cases", "exactly",
+            "within the class", "verdicts", "said where not exactly")  # fmt: skip
+    return ["## By physical definition", DEFINED, table(head, rows)]
+
+
+def _calibration(scores: Sequence[Score]) -> str:
+    found = [
+        (r["of"], str(r["findings"]), share(Rate(r["true"], r["findings"])),
+         share(Rate(r["within"], r["findings"])))
+        for r in calibration.reliability(scores)
+    ]  # fmt: skip
+    if not found:
+        return "Nothing was found."
+    held = [
+        (r["effect"], str(r["intervals"]), share(Rate(r["held"], r["intervals"])),
+         _number(r["median_error"], ".1%"))
+        for r in calibration.coverage(scores)
+    ]  # fmt: skip
+    parts = [table(("findings by", "findings", "true", "true or declared confusable"), found)]
+    if held:
+        head = ("effect", "parameters", "95 % interval held the truth", "median error")
+        parts.append(table(head, held))
+    return "\n\n".join(parts)
 
 
 def _confusion(scores: Sequence[Score]) -> str:

@@ -1,0 +1,24 @@
+"""How a healthy machine's dry friction holds at rest, by definition."""
+
+from .nominal import Nominal
+from .variants import LUGRE
+
+# tanh(v/v0) creeps by v0/2 under half the Coulomb force: a five-hundredth of the top speed, as
+# simulators that have it advise.
+_SMOOTH = 2e-3
+
+
+def sticking(name: str, n: Nominal) -> dict[str, float]:
+    """The simulator's parameters of a definition of `stick`; none of the usual one."""
+    level = max(n.physics[f"coulomb{s}"] + n.physics[f"bump{s}"] for s in "+-")
+    if name == "smooth":
+        # Steeper, and a substep would cross zero and back.
+        speed = max(_SMOOTH * n.top, 1.25 * level * n.substep / n.mass)
+        return {"smooth_speed": speed, "still": 3 * speed}
+    if name == "bristles":
+        stable = 1.6 * level / n.mass * (n.substep / 0.3) ** 2
+        return {
+            "presliding": 1.0, "presliding_shape": LUGRE, "bristle_damping": 0.7,
+            "presliding_distance": max(1e-6 * n.plan.stroke, stable),
+        }  # fmt: skip
+    return {}
