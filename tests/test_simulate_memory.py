@@ -11,8 +11,8 @@ from jaxfric import terms
 from jaxfric.simulation.prediction import in_motion
 from jaxfric.simulation.simulating import default_substeps
 from jaxfric.terms.base import Sum, summands
-from jaxfric.terms.effects import compliance
-from jaxfric.units import FORCE
+from jaxfric.terms.effects import EFFECTS, compliance
+from jaxfric.units import FORCE, STIFFNESS
 
 SLIP = {"inertia": 5.0, "coulomb+": 20.0, "viscous+": 60.0, "coulomb-": 18.0, "viscous-": 80.0}
 
@@ -267,9 +267,41 @@ def test_a_load_on_a_spring_is_differentiable():
         clock = jf.Recording(time, 40 + 0 * time, 0 * time)
         return jf.simulate(model, clock, initial=(0.0, 0.0), substeps=1).position[-1]
 
-    compiled = jax.jit(end)
+    above, below = jax.jit(jax.vmap(end))(jnp.array([12.01, 11.99]))
     slope = float(jax.jit(jax.grad(end))(12.0))
-    assert slope == pytest.approx(float(compiled(12.01) - compiled(11.99)) / 0.02, rel=1e-3)
+    assert slope == pytest.approx(float(above - below) / 0.02, rel=1e-3)
+
+
+class Worn(terms.AbstractStates):
+    """A law of one's own: friction that grows with the way, F = A s sign(v), ds/dt = |v|."""
+
+    affine = (terms.Parameter("wear", STIFFNESS),)
+
+    def columns(self, recording):
+        way = jnp.cumsum(jnp.abs(jnp.diff(recording.position, prepend=recording.position[:1])))
+        return (way * jnp.sign(recording.velocity))[:, None]
+
+    def start(self, position, velocity):
+        return terms.States(0 * velocity[None], velocity[None][:0])
+
+    def present(self, states, now):
+        return states.flow * now.side
+
+    def rates(self, states, now):
+        return (now.velocity * now.side)[None]
+
+
+@pytest.mark.slow
+def test_a_memory_of_ones_own_is_held():
+    model = axis(Worn(), wear=100.0)
+    of_force, of_effect = disagreement(model, looped(model))
+    assert of_force < 0.01 and of_effect < 1 / 16
+
+
+def test_no_memory_of_the_library_is_refused():
+    laws = {law for effect in EFFECTS.values() for law in effect.laws}
+    memories = {law for law in laws if issubclass(law, terms.AbstractMemory)}
+    assert len(memories) >= 7 and all(issubclass(law, terms.AbstractStates) for law in memories)
 
 
 class Forgotten(terms.AbstractMemory):

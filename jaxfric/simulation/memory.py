@@ -7,6 +7,7 @@ dies out and cannot grow (Verwer, Spee, Blom & Hundsdorfer 1999).
 """
 
 import dataclasses
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -135,10 +136,9 @@ class Augmented(eqx.Module):
             found.append(self._bristles(states, now.velocity, now.slip)[1][None])
         return found
 
-    def _each(self, verb: str, states, now: Instant, span):
-        """The states after each term's own `ready` or `settled`."""
-        terms = [getattr(term, verb) for term, _ in self.parts]
-        done = [act(own, now, span) for act, own in zip(terms, states, strict=False)]
+    def _each(self, act: Callable, states):
+        """The states of each term as `act` of the term and them gives them."""
+        done = [act(term, own) for (term, _), own in zip(self.parts, states, strict=False)]
         return (*done, *states[len(done) :])
 
     def _side(self, x, v, states, force, rest):
@@ -155,7 +155,8 @@ class Augmented(eqx.Module):
     def _phase(self, x, v, states, force, span, rest):
         """One step on one side of zero velocity, ended where the velocity is zero."""
         least = slowest(v.dtype)
-        states = self._each("ready", states, Instant(x, v, v, jnp.sign(v)), span)
+        begin = Instant(x, v, v, jnp.sign(v))
+        states = self._each(lambda term, own: term.ready(own, begin, span), states)
         side = self._side(x, v, states, force, rest)
         force = self.still.on_side(force, side, v)
         flows, again = ravel_pytree([own.flow for own in states])
@@ -177,8 +178,9 @@ class Augmented(eqx.Module):
         end = first + share * (last - first)
         velocity = jnp.where(stops | (side == 0), 0.0, end[1])
         moved = [own._replace(flow=f) for own, f in zip(states, again(end[2:]), strict=True)]
-        now = Instant(end[0], velocity, velocity, side)
-        return end[0], velocity, self._each("settled", moved, now, share * span), span * (1 - share)
+        now, taken = Instant(end[0], velocity, velocity, side), share * span
+        states = self._each(lambda term, own: term.settled(own, now, taken), moved)
+        return end[0], velocity, states, span * (1 - share)
 
 
 def _counting(model: Model, pairs):

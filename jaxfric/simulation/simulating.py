@@ -76,9 +76,9 @@ def simulate(
 
     - `model`: any [`Model`][jaxfric.models.Model] with inertia, whose terms are functions of one
       sample, or have a memory that is a few states of the axis: bristles, a load on a spring or
-      behind a gap, frictional lag ([`AbstractStates`][jaxfric.terms.AbstractStates]); units are
-      those of the recording. Terms that read `predicted_force` are the actuator between the
-      command and the axis: `force` is the command, and the axis feels what arrives of it.
+      behind a gap, frictional lag, and your own (`jaxfric.terms.AbstractStates`); units are those
+      of the recording. Terms that read `predicted_force` are the actuator between the command and
+      the axis: `force` is the command, and the axis feels what arrives of it.
     - `reference`: a recording, signals of shape `(N,)`. With a `controller`, the set-point is its
       channel `reference`, else its position; the set-point's velocity is the channel
       `reference_velocity`, else the velocity that belongs to the position, else differences.
