@@ -317,8 +317,11 @@ def test_what_cannot_be_held_is_refused():
     clock = driven(30.0, 0.01)
     with pytest.raises(ValueError, match="Forgotten gives none.*AbstractStates"):
         jf.simulate(bare(Forgotten(), drift=0.1), clock)
-    with pytest.raises(ValueError, match="larger than that of the load"):
+    with pytest.raises(ValueError, match="load of 5 leaves the motor none"):
         jf.simulate(loaded(load_inertia=5.0), clock)
+    with pytest.raises(ValueError, match=r"Add jaxfric.terms.Inertia\(\)"):
+        gap_alone = {"backlash_force": 8.0, "half_gap": 1e-3}
+        jf.simulate(jf.models.from_parameters(terms.Backlash(), gap_alone), clock)
     with pytest.raises(ValueError, match="smooth"):
         jf.simulate(loaded(), clock, smooth=1e-3)
 

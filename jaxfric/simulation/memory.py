@@ -38,10 +38,15 @@ def lost(model: Model) -> list[str]:
     ]
 
 
-def shedding(model: Model) -> bool:
-    """Whether terms of a model take inertia off the motor."""
-    held = [term for term in summands(model.term) if isinstance(term, AbstractStates)]
-    return any(bool(jnp.any(jnp.asarray(term.shed) != 0)) for term in held)
+def carried(model: Model) -> float:
+    """The inertia of the loads that the motor does not carry rigidly, kg."""
+    with jax.ensure_compile_time_eval():
+        return float(Augmented(model).shed()) if rigid(model) else 0.0
+
+
+def rigid(model: Model) -> bool:
+    """Whether a term without states has inertia."""
+    return any(term.inertial for term in summands(model.term) if not _held(term))
 
 
 def _held(term) -> bool:

@@ -15,7 +15,7 @@ from ..data.recording import Recording, described, require
 from ..models import Model, require as require_model
 from . import actuator as faults
 from .control import AbstractController, Encoder, Feedback
-from .memory import Augmented, holds, lost, shedding
+from .memory import Augmented, carried, holds, lost, rigid
 from .plant import Plant, Surroundings, slowest
 
 # Between two samples the actuator force is constant, so the acceleration changes only as fast as
@@ -158,10 +158,14 @@ def _check(model, reference, controller, encoder, force_noise, key):
     if not _traced(model):
         faults.check(model)
     if not _traced((model, reference)) and _massless(model, reference):
+        if load := carried(model):
+            raise ValueError(
+                f"simulate moves motor and load each by its own inertia, and a load of {load:.4g} "
+                "leaves the motor none of the model's. Give it less, or identify the model anew."
+            )
         raise ValueError(
             "simulate needs an inertia to accelerate, and the model's is not positive: it has "
-            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass"
-            + (", larger than that of the load on its coupling." if shedding(model) else ".")
+            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass."
         )
     noisy = _positive(force_noise) or (encoder is not None and _positive(encoder.noise))
     if noisy and key is None:
@@ -193,6 +197,8 @@ def _lacking(model) -> list[str]:
 
 
 def _massless(model, reference) -> bool:
+    if not rigid(model):
+        return True
     # Inside jax.jit a computation on known numbers is put off too, unless one insists.
     with jax.ensure_compile_time_eval():
         return not bool(np.all(np.asarray(_rates(model, reference, None)[0]) > 0))
