@@ -284,6 +284,7 @@ def _row(joint: Joint) -> dict[str, Any]:
         "filtered_force_error": errors["filtered_force_error"],
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
         "corrected_before": list(joint.corrected),
+        "actuator": [] if joint.simulator is None else joint.simulator.standing,
     }
 
 

@@ -198,7 +198,8 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
             )
         return f"the recorded force (the torque constant) is {size} times the simulator's"
     if name == _gear(own):
-        return f"{own[GAIN].owner}: {own[GAIN].what} {m.before:.4g} → {said}"
+        times = _times(m) if own[GAIN].what == "gear" else ""
+        return f"{own[GAIN].owner}: {own[GAIN].what} {m.before:.4g} → {said}{times}"
     if name in own:
         attribute = own[name]
         text = f"{attribute.owner}: {attribute.what} {attribute.value:.4g} → {said}"
@@ -206,6 +207,14 @@ def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
         return f"missing, a spring: {text}" if missing else text
     kind, owner, what = name.split("/")
     return f"{kind} {owner}: {what} {m.before:.4g} → {said}"
+
+
+def _times(m: Moved) -> str:
+    """What another gain is of the recorded force."""
+    times = float(m.before) / float(m.value)
+    if times < 0:
+        return f" (the recorded force is counted the other way, {-times:.4g} times the simulator's)"
+    return f" (the recorded force, or the torque constant, is {times:.4g} times the simulator's)"
 
 
 def _doubt(

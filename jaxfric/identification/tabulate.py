@@ -310,6 +310,8 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
             lines += ["", *wrapped(f"{row['joint']}: {each}")]
         if row.get("corrected_before"):
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
+        for each in row.get("actuator", ()):
+            lines += ["", *wrapped(f"{row['joint']}: {each}")]
     lines += ["", "Force errors through the kernel by which effects are looked for."]
     return "\n".join(lines)
 

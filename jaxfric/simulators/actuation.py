@@ -255,7 +255,7 @@ def standing(mujoco: Any, model: Any, joint: int, commanded: Actuator | None) ->
     name = model.joint(joint).name or f"joint{joint + 1}"
     if commanded is not None:
         made = f"what the model's actuator {commanded.name} makes of the recorded command"
-        return [f"Force of joint {name}: {made}."]
+        return [f"The joint's force is {made}."]
     try:
         own = read(mujoco, model, joint)
     except ValueError:
@@ -263,7 +263,7 @@ def standing(mujoco: Any, model: Any, joint: int, commanded: Actuator | None) ->
     if own.plain:
         return []
     return [
-        f"The log holds the force of joint {name}: bias and time constant of its actuator "
-        f"{own.name} stand before that force, and are not told. Its command would: --columns "
+        f"The log holds the joint's force: bias and time constant of its actuator {own.name} stand "
+        f"before that force, and are not told. Its command would tell them: --columns "
         f"{name}_command=NAME."
     ]
