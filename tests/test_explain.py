@@ -39,6 +39,7 @@ from jaxfric.explanation import (
     verdict,
     verification,
 )
+from jaxfric.explanation.inputs import straight
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
@@ -125,6 +126,33 @@ def test_nothing_is_missing_where_nothing_is(healthy):
     # What was not found is listed, with a size between the noise and the Coulomb level.
     sizes = {entry["effect"]: entry["smallest_detectable"] for entry in found.not_visible}
     assert 0 < sizes["cogging"] < 0.1 * COULOMB
+
+
+@pytest.mark.slow
+def test_friction_of_a_recorded_load_is_told_by_that_load(healthy):
+    runs = []
+    for number, recording in enumerate(healthy):
+        load = 200.0 * (1.2 + np.sin(0.7 * TIME + number))
+        log = dataclasses.replace(recording, channels={"load": jnp.asarray(load)})
+        runs.append(planted(log, terms.LoadDependentFriction("load"), (0.02,)))
+    found = explain(runs[0], "gaussian", runs[1])
+    assert [f.effect for f in found.findings] == ["load_dependent_friction"]
+    assert float(found.findings[0].parameters["load_friction"].value) == pytest.approx(
+        0.02, rel=0.1
+    )
+    assert found.findings[0].confirmed
+
+
+def test_a_position_that_is_held_between_updates_is_taken_as_straight(healthy):
+    position = np.asarray(healthy[0].position)
+    seldom = dataclasses.replace(
+        healthy[0], position=jnp.asarray(position[np.arange(position.size) // 4 * 4])
+    )
+    fresh, remarks = straight(seldom)
+    assert [r.name for r in remarks] == ["position_held"] and "every 4 samples" in remarks[0].text
+    stairs = np.std(np.asarray(seldom.position) - position)
+    assert np.std(np.asarray(fresh.position) - position) < 0.05 * stairs
+    assert straight(healthy[0]) == (healthy[0], [])
 
 
 @pytest.mark.slow

@@ -327,3 +327,26 @@ def test_without_repair_what_cannot_be_computed_with_is_masked_or_refused(tmp_pa
     with pytest.raises(ValueError, match=r"back\.csv: row 62: time does not increase"):
         io.read(path, repair=False)
     assert io.read(path).num_samples == 299
+
+
+# ---- a position at another rate ----
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_a_position_that_is_held_between_updates_is_straight_between_them(every):
+    t = np.arange(4000) / 1000
+    x = np.round(np.sin(3 * t) + 0.3 * np.sin(8 * t), 6)
+    held = x[np.arange(x.size) // every * every]
+    tidy = put_in_order(t, held)
+    assert any(f"new at every {every} samples" in text for text in tidy.notes)
+    inside = slice(None, -every)
+    assert np.max(np.abs(tidy.signals["position"] - x)[inside]) < 1e-4 < np.max(np.abs(held - x))
+    np.testing.assert_array_equal(tidy.signals["position"][::every], held[::every])
+
+
+def test_a_coarse_encoder_or_a_rest_holds_no_position():
+    t = np.arange(4000) / 1000
+    for x in (np.round(np.sin(3 * t), 2), np.clip(np.sin(3 * t), -0.5, 0.5), np.zeros_like(t)):
+        tidy = put_in_order(t, x)
+        np.testing.assert_array_equal(tidy.signals["position"], x)
+        assert not any("straight" in text for text in tidy.notes)

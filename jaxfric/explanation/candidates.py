@@ -21,6 +21,10 @@ from .threads import begin
 KEPT = 1 << 28
 
 
+# Signals that a recording may lack, of which some laws of an effect are functions.
+CHANNELS = frozenset({"position", "load"})
+
+
 class Candidate(NamedTuple):
     """A term of an effect, and its grid of β: `betas`, `(G, d)`.
 
@@ -141,7 +145,7 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         if effect.needs - have or (effect.momentary and not evidence.clock):
             continue
         for term in effect.shapes(seen.limits):
-            if "position" in term.coordinates and "position" not in have:
+            if term.coordinates & CHANNELS - have:
                 continue
             for suited in effect.suited(term, base, turn):
                 found += _placed(effect, suited, evidence, seen)

@@ -9,6 +9,7 @@ import numpy as np
 
 from .. import checks
 from ..checks import Remark
+from ..data.cleaning import between_updates, held_for
 from ..data.recording import Recording, check_same_units, require, require_force
 from ..identification.identified import Identified
 from ..models import NAMED, Model
@@ -60,6 +61,8 @@ def prepare(
     **Raises:** `ValueError` for what cannot be explained.
     """
     _check(recording, baseline, holdout)
+    recording, seldom = straight(recording)
+    holdout = None if holdout is None else straight(holdout)[0]
     baseline, looked = _simulator(recording, baseline, holdout), None
     if isinstance(baseline, AbstractSimulator):
         doing("looking at signs, zeros, clocks and limits")
@@ -74,6 +77,7 @@ def prepare(
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
     short = shortened(recording)
     sound, remarks = inspected(short)
+    remarks += seldom
     remarks += checks.cut(short.num_samples / recording.num_samples)
     sound_holdout, more = (None, []) if holdout is None else inspected(shortened(holdout))
     baseline = shortened(baseline) if isinstance(baseline, Recording) else baseline
@@ -140,6 +144,22 @@ def _alone(recording: Recording) -> Recording:
     """The recording without another simulator's force, which this baseline does not stand on."""
     channels = {k: v for k, v in recording.channels.items() if not k.startswith(KNOWN)}
     return dataclasses.replace(recording, channels=channels)
+
+
+def straight(recording: Recording) -> tuple[Recording, list[Remark]]:
+    """A recording whose position is held between updates, with it straight; and what to say."""
+    position = None if recording.position is None else np.asarray(recording.position)
+    every = 1 if position is None else held_for(position)
+    if every == 1:
+        return recording, []
+    time, segment = np.asarray(recording.time), np.asarray(recording.segment)
+    fresh = between_updates(time, position, segment, every).astype(position.dtype)
+    text = (
+        f"{recording.source or 'The recording'}: the position is new at every {every} samples "
+        "only, at a lower rate than the force: taken as straight between them. Log both alike."
+    )
+    remarks = [Remark("position_held", text, False)]
+    return dataclasses.replace(recording, position=jnp.asarray(fresh)), remarks
 
 
 # What is said of lone samples in other words, as they are left out here.

@@ -6,6 +6,7 @@ import numpy as np
 
 from . import clock
 from .filtered import filtered_seams
+from .held import between_updates, held_for
 from .missing import missing_rows
 from .pieces import borders, note, runs, some
 from .wraps import check_period, unwrap
@@ -63,6 +64,7 @@ def clean(
             segment = filtered_seams(signals, mask, segment, rows, notes)
         unwrap(signals, mask, segment, rows, notes, period, quiet=len(notes) > told)
         segment = missing_rows(signals, mask, segment, rows, notes)
+        _fresh(signals, segment, notes)
     elif period is not None:
         unwrap(signals, mask, segment, rows, notes, period)
     return Clean(signals, mask, segment, notes)
@@ -83,6 +85,15 @@ def _with_all_stamps(signals, segment, rows, stamped, notes, source):
     note(notes, ~stamped, rows, "without a time stamp masked")
     clock.check_increases(signals["time"][stamped], segment[stamped], rows[stamped], source)
     return signals | {"time": _filled(signals["time"], ~stamped, segment)}
+
+
+def _fresh(signals, segment, notes) -> None:
+    """A position that comes at a lower rate than the rest, straight between its updates."""
+    every = held_for(signals["position"]) if "position" in signals else 1
+    if every > 1:
+        fresh = between_updates(signals["time"], signals["position"], segment, every)
+        signals["position"] = fresh
+        notes.append(f"The position is new at every {every} samples only: straight between them.")
 
 
 def _mask(signals, segment, rows, notes, source) -> np.ndarray:

@@ -14,6 +14,9 @@ from ..effect import Effect
 from ..sample import Parameter, Sample
 from ..table import reading
 
+LOAD = "load"
+"""The channel of a recorded load."""
+
 
 class LoadDependentFriction(AbstractLaw):
     """Friction proportional to a load: F = μ abs(N) sign(v) (Amontons).
@@ -44,8 +47,8 @@ LOAD_DEPENDENT_FRICTION = Effect(
     "friction",
     "Friction grows with the load by {load_friction} of it",
     laws=(LoadDependentFriction,),
+    scaled=lambda scales: (LoadDependentFriction(), LoadDependentFriction(LOAD)),
     coordinates=("predicted_force_by_direction", "predicted_force"),
-    needs=frozenset({"predicted_force"}),
     confusable_with=("gain_asymmetry", "actuator_saturation"),
     separate_by="Record the load, or repeat with another payload.",
     positive=True,

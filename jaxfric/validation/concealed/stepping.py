@@ -201,7 +201,10 @@ def _kick(p, motor, load, memory, now, span, two, more):
         dry = variants.dry_force(p, way, motor.velocity, memory, level, _side(p, "coulomb", way))
     friction = dry + way * level.wet
     stuck = ~moving & ~elastic & (jnp.abs(free) <= level.dry + level.wet)
-    rate = jnp.where(stuck, 0.0, (free - friction) / mass)
+    resistance = variants.resistance(p, motor.velocity, level) if more else 0.0
+    rate = jnp.where(stuck, 0.0, (free - friction) / (mass + span * resistance))
+    if more:
+        friction = friction + span * resistance * rate
     velocity = motor.velocity + rate * span
     stops = moving & ~elastic & (velocity * motor.velocity < 0)
     velocity = jnp.where(stops, 0.0, velocity)

@@ -12,9 +12,7 @@ def sticking(name: str, n: Nominal) -> dict[str, float]:
     """The simulator's parameters of a definition of `stick`; none of the usual one."""
     level = max(n.physics[f"coulomb{s}"] + n.physics[f"bump{s}"] for s in "+-")
     if name == "smooth":
-        # Steeper, and a substep would cross zero and back.
-        speed = max(_SMOOTH * n.top, 1.25 * level * n.substep / n.mass)
-        return {"smooth_speed": speed, "still": 3 * speed}
+        return {"smooth_speed": _SMOOTH * n.top, "still": 3 * _SMOOTH * n.top}
     if name == "bristles":
         stable = 1.6 * level / n.mass * (n.substep / 0.3) ** 2
         return {

@@ -70,6 +70,14 @@ def dry_force(p, way, v, memory, level, coulomb):
     return jnp.where(p["smooth_speed"] > 0, smooth, carried)
 
 
+def resistance(p, v, level):
+    """Of smooth friction, N·s/m: the step is implicit in it, so that none is too steep."""
+    speed = jnp.maximum(p["smooth_speed"], 1e-30)
+    ratio = jnp.abs(v) / speed
+    slope = jnp.where(ratio > 1e-3, jnp.tanh(ratio) / jnp.maximum(ratio, 1e-3), 1.0)
+    return jnp.where(p["smooth_speed"] > 0, level.dry * slope / speed, 0.0)
+
+
 def engaged(p, motor, load, way):
     """Whether the motor is at the flank of an ideal play that it moves, or pushes, against."""
     apart = motor.position - load.position
