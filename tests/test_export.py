@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from jaxfric import models, terms
-from jaxfric.cli import main
+from jaxfric.cli import main, saving
 from jaxfric.data.recording import Recording
 from jaxfric.export import TARGETS, export
 from jaxfric.terms import Directional
@@ -563,3 +563,20 @@ def test_friction_that_drives_is_remarked_on():
         assert "inertia is negative, -0.7" in remarks and "drives the axis" in remarks
     load = {"inertia": 2.0, "coulomb+": 50.0, "viscous+": 3.0, "coulomb-": -10.0, "viscous-": 3.0}
     assert not export(models.from_parameters(models.coulomb_viscous(), load), "c").remarks
+
+
+def test_what_exports_will_lack_is_said_at_saving(tmp_path, capsys):
+    saving.saved("better.json", model(terms.Coulomb() + terms.GainAsymmetry()))
+    assert capsys.readouterr() == ("", "")
+    saving.saved("better.json", model(terms.Coulomb() + terms.TransportDelay()))
+    told = " ".join(capsys.readouterr().err.split())
+    assert told.startswith(
+        "better.json: C, Structured Text and FMU leave out transport_delay: hand"
+    )
+    saving.saved("better.json", model(terms.Coulomb()).with_bristles(1e5))
+    assert "leave out the bristles" in capsys.readouterr().err
+    unseen = models.Model(terms.Coulomb(), jnp.asarray([jnp.nan]))
+    saving.saved("better.json", unseen)
+    assert "better.json: no target takes this model. There is no value for coulomb" in " ".join(
+        capsys.readouterr().err.split()
+    )
