@@ -1,9 +1,12 @@
 """What changes at one moment, on machines of a few lines: an arm in rad, a slide in mm."""
 
+import jax
 import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.validation.concealed import draw, record
+from jaxfric.validation.proof import planning
 
 MOMENT = 5.0
 
@@ -64,3 +67,17 @@ def test_a_change_at_one_moment_is_named_with_it(change, effect, name, relative,
 def test_where_nothing_changes_no_moment_is_named():
     recording, simulator = ran("", True)
     assert jf.explain(recording, simulator).findings == []
+
+
+@pytest.mark.slow
+def test_what_is_none_beside_the_base_s_own_values_is_not_reported():
+    """Friction that depends on acceleration, which no effect has: a load of 0 ± 185 kg was named."""
+    case = planning.plan(48, 20261401, (0.1, 0.3))[47]
+    machine = draw(case.seed, case.effects, case.size, dict(case.definitions))
+    runs = record(machine)
+    with jax.enable_x64(True):
+        told = jf.explain(runs.recording, machine.baseline, runs.holdout)
+    for finding in told.findings:
+        sizes = [e.interval() for e in finding.parameters.values() if hasattr(e, "interval")]
+        assert any(low * high > 0 for low, high in sizes), finding.sentence
+    assert told.verdict == "unexplained" and told.not_confirmed

@@ -61,7 +61,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
         better = _refuting(better, better.findings, others)._replace(refuted=tested)
         better = _measured(better, figures)
     if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
-        better = _measured(_at_base_values(better), figures)
+        better = _measured(_without_nil(_at_base_values(better)), figures)
     if better.after.worse(better.before, figures.rounding):
         base, every = findings.at_base(better.first), tuple(range(len(borne)))
         better = better._replace(findings=base, refitted=False, refuted=every)
@@ -101,6 +101,15 @@ def _at_base_values(better: Improved) -> Improved:
         return Solution(problem, selection._replace(last=last, given=model, free=()))
 
     return better._replace(findings=Findings(given(recorded), given(undelayed)))
+
+
+def _without_nil(better: Improved) -> Improved:
+    """Without findings whose force may as well be none once the base has its own values."""
+    findings = better.findings
+    numbers = [n for n in range(len(better.claimed.selection.selected)) if n not in better.refuted]
+    gone = [n for n, none in enumerate(_nil_in_both(findings)) if none]
+    refuted = (*better.refuted, *(numbers[n] for n in gone))
+    return _refuting(better, findings, gone)._replace(refuted=tuple(sorted(refuted)))
 
 
 def _measured(better: Improved, figures: Figures) -> Improved:
