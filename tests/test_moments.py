@@ -71,7 +71,7 @@ def test_where_nothing_changes_no_moment_is_named():
 
 @pytest.mark.slow
 def test_what_is_none_beside_the_base_s_own_values_is_not_reported():
-    """Friction that depends on acceleration, which no effect has: a load of 0 ± 185 kg was named."""
+    """Friction by acceleration, which no effect has: a load of 0 ± 185 kg was named."""
     case = planning.plan(48, 20261401, (0.1, 0.3))[47]
     machine = draw(case.seed, case.effects, case.size, dict(case.definitions))
     runs = record(machine)
