@@ -13,7 +13,8 @@ import scipy.optimize
 
 from jaxfric.data.recording import Recording
 from jaxfric.identification import reduced
-from jaxfric.identification.identifying import _solve, _without_inertia
+from jaxfric.identification.assessment import solve
+from jaxfric.identification.identifying import _without_inertia
 from jaxfric.identification.projections import ClosedWindows
 from jaxfric.identification.search import search
 from jaxfric.models import named
@@ -67,7 +68,7 @@ def jaxfric_fit(term, ready, rows, box, grid=None):
     found = search(term, ready, rows, box, grid, True)
     if found.minimum is not None:
         return found.minimum, found.beta, found.alpha
-    alpha, _, left = _solve(term, found.beta, ready, rows, found.alpha)
+    alpha, _, left = solve(term, found.beta, ready, rows, found.alpha)
     weight = rows.positive + rows.negative
     return jnp.sum(weight * left**2), found.beta, alpha
 

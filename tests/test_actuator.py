@@ -1,13 +1,17 @@
 """An actuator in simulation: what arrives of a command is what `predict` would have asked for."""
 
+import json
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric import terms
+from jaxfric import models, terms
+from jaxfric.export.parts import unwritten
 from jaxfric.models import coulomb_viscous, from_parameters
+from jaxfric.simulation.prediction import arrived, force_error
 
 AXIS = {"inertia": 2.0, "coulomb+": 5.0, "coulomb-": 6.0, "viscous+": 10.0, "viscous-": 11.0}
 FAULTS = {
@@ -145,3 +149,30 @@ def test_it_differentiates_and_compiles_from_outside():
 def test_an_actuator_that_gives_nothing_is_refused():
     with pytest.raises(ValueError, match="gain_asymmetry is -0.95.*less than a tenth"):
         jf.simulate(axis("gain asymmetry").with_parameters({"gain_asymmetry": -0.95}), swing(20))
+
+
+def test_a_force_limit_is_held_predicted_with_saved_and_said():
+    """The command goes beyond it, the axis feels no more, and the figure counts no more."""
+    limited = axis().with_force_limit(9.0)
+    run = jf.simulate(limited, swing(), jf.PD(kp=2.0e4, kd=300.0))
+    bounded = jf.simulate(axis(), swing(), jf.PD(kp=2.0e4, kd=300.0, limit=9.0))
+    np.testing.assert_allclose(run.position, bounded.position, atol=1e-12)
+    command = np.asarray(run.force)
+    assert np.abs(command).max() > 10 > np.abs(np.asarray(bounded.force)).max()
+    np.testing.assert_allclose(np.clip(command, -9.0, 9.0), bounded.force, atol=1e-9)
+    np.testing.assert_allclose(arrived(limited, run), bounded.force, atol=1e-9)
+    assert np.array_equal(arrived(axis(), run), command)
+    assert force_error(limited, run) == pytest.approx(force_error(axis(), bounded), rel=1e-6)
+    assert force_error(limited, run) < 0.5 * force_error(axis(), run)
+    again = models.load(json.dumps(limited.to_dict()))
+    assert float(again.force_limit) == 9.0 and "force_limit" in repr(again)
+    assert again.to_dict() == limited.to_dict() and "force_limit" not in axis().to_dict()
+    (line,) = unwritten(limited)
+    assert line.startswith("force limit: no more than 9 N arrives")
+
+
+@pytest.mark.parametrize("value", [9.0, {"unit": "N"}, {"value": -1.0}, {"value": "many"}])
+def test_a_damaged_force_limit_is_refused(value):
+    document = axis().to_dict() | {"force_limit": value}
+    with pytest.raises(ValueError, match="force_limit|force limit"):
+        models.load(json.dumps(document))

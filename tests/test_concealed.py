@@ -106,6 +106,7 @@ def test_machines_spread_over_units_and_sample_rates():
         assert 6 <= machine.plan.samples / machine.plan.sample_rate <= 60.1
 
 
+@pytest.mark.slow
 def test_the_flanks_of_a_gap_give_way_by_less_than_it():
     for seed in (64, 66, 69):
         truth = concealed.draw(seed, ("backlash",)).truth["backlash"]
@@ -277,6 +278,7 @@ def test_every_definition_is_physics_that_explains_the_force(which):
     assert residual < 1.4 or which.kind.logged is not None
 
 
+@pytest.mark.slow
 def test_a_hard_limit_is_met_and_never_passed():
     machine = by_definition("actuator_saturation", "clip")
     run = concealed.record(machine)
@@ -287,6 +289,7 @@ def test_a_hard_limit_is_met_and_never_passed():
     assert np.max(np.abs(arrived[moving])) < 1.001 * knee
 
 
+@pytest.mark.slow
 def test_a_smooth_friction_creeps_where_the_exact_one_sticks():
     rests = []
     for name in ("exact", "smooth"):
@@ -296,6 +299,7 @@ def test_a_smooth_friction_creeps_where_the_exact_one_sticks():
     assert rests[0] > 0.01 and rests[1] < 0.1 * rests[0]
 
 
+@pytest.mark.slow
 def test_the_log_alone_holds_a_position_and_filters_a_velocity():
     plain, held, drive = (
         concealed.record(by_definition("log", name))

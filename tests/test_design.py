@@ -153,6 +153,7 @@ def test_what_is_apart_is_what_the_best_imitation_leaves(separated):
     assert told.after == pytest.approx(min(left), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_what_no_motion_shows_is_left_out():
     found = separate(sprung(), {"spring": ["hardening_spring", "cross_axis"]}, LIMITS, steps=1)
     assert found.left_out == ("cross_axis",) and len(found.apart) == 2

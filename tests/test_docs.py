@@ -78,9 +78,11 @@ def test_the_reference_shows_every_command_and_every_effect():
 
 @pytest.mark.slow
 def test_identify_my_axis():
-    _, said = run("identify.md")
+    session, said = run("identify.md")
     text = "".join(said)
-    assert text.count("OUTSIDE") <= 1 and "result successful" in text
+    assert "result successful" in text
+    # 95 %; two deviations below, of 64 draws: the errors of one direction of a log go together.
+    assert 0.89 < session["inside"] / session["total"] <= 1.0
     assert "not_passive" in text or "contradictory" in text  # the wrong sign
     assert sum("data:image/png" in each for each in said) == 2
 

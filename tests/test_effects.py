@@ -24,6 +24,8 @@ from jaxfric.units import Dimension, spell
 # its Coulomb friction.
 CASES = {
     "asymmetry": (T.FrictionAsymmetry(), (1.0, 3.0)),
+    "coulomb_forwards": (T.CoulombAsymmetry("forwards"), (1.0,)),
+    "coulomb_backwards": (T.CoulombAsymmetry("backwards"), (1.0,)),
     "quadratic_drag": (T.QuadraticDrag(), (100.0,)),
     "power_law": (T.PowerLaw(2.5, 0.2), (5.0,)),
     "shear_thinning": (T.ShearThinning(0.05), (60.0,)),
@@ -554,6 +556,11 @@ def test_a_planted_term_comes_back(healthy, term, alpha):
     if isinstance(term, T.FrictionAsymmetry):  # a base with two directions has it already
         base = T.Inertia() + T.Coulomb() + T.Viscous()
         expected = expected + [1.0, -10.0]  # half the difference of BASE's directions
+    if isinstance(term, T.CoulombAsymmetry):
+        base = T.Inertia() + T.Coulomb() + T.Directional(T.Viscous())
+        expected = expected + [
+            2.0 if term.side == "forwards" else -2.0
+        ]  # of which BASE has 1 N to either side
     recording = planted(healthy, term, alpha)
     width = signals.kernel_half_width(recording)
     rows = WeakForm(width).rows(recording, signals.scales(recording))

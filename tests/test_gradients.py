@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification.identifying import _solve
+from jaxfric.identification.assessment import solve
 from jaxfric.identification.projections import Rows
 from jaxfric.identification.search import search
 from jaxfric.programs import quick_options
@@ -52,7 +52,7 @@ def fit(term, velocity, force, weight, box=BOX):
     box = jnp.asarray(box)
     rows = Rows(force, positive, weight - positive, weight, clock, one, one)
     found = search(term, log, rows, box[:, : len(term.nonlinear)], None)
-    return jnp.concatenate([_solve(term, found.beta, log, rows)[0], found.beta])
+    return jnp.concatenate([solve(term, found.beta, log, rows)[0], found.beta])
 
 
 def slopes(term, data):

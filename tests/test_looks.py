@@ -314,6 +314,7 @@ def test_html_has_the_same_and_a_picture(fit, recording, explanation):
         assert word in page.said and {"table", "img"} <= page.tags
 
 
+@pytest.mark.slow
 def test_where_nothing_was_visible_there_is_no_curve(fit, recording, pyplot):
     blind = eqx.tree_at(lambda f: f.covariance, fit, fit.covariance + jnp.inf)
     assert "img" not in Reader(blind._repr_html_()).tags

@@ -13,7 +13,7 @@ from jaxfric.data import writing
 from jaxfric.data.excerpt import MOST, PIECES, excerpt
 from jaxfric.data.recording import pad
 from jaxfric.models import from_parameters
-from jaxfric.signals import polynomial
+from jaxfric.signals import derivatives
 from jaxfric.simulation import prediction
 
 
@@ -56,9 +56,9 @@ def test_a_derivative_in_pieces_is_that_of_the_whole(tmp_path, monkeypatch, half
     mask[5000:5100] = False
     recording = dataclasses.replace(recording, mask=mask)
     position = np.asarray(recording.position)
-    whole = polynomial.derivative(recording, position, half_width)
-    monkeypatch.setattr(polynomial, "MOST", 3000)
-    pieces = polynomial.derivative(recording, position, half_width)
+    whole = derivatives.derivative(recording, position, half_width)
+    monkeypatch.setattr(derivatives, "MOST", 3000)
+    pieces = derivatives.derivative(recording, position, half_width)
     np.testing.assert_allclose(pieces, whole, rtol=1e-9, atol=1e-12)
 
 

@@ -2,20 +2,21 @@
 
 import dataclasses
 import json
+import types
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import models, predict, read, terms
+from jaxfric import Recording, models, predict, read, terms
 from jaxfric.cli import main
 from jaxfric.data import io
-from jaxfric.explanation import doubts, explain, improvement, least_squares, regression
+from jaxfric.explanation import doubts, explain, explaining, improvement, least_squares, regression
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
-from jaxfric.simulation.prediction import delay_of, force_error, in_motion, outliers
+from jaxfric.simulation.prediction import Prepared, delay_of, force_error, in_motion, outliers
 
 from .test_explain import CASES, TIME, healthy, planted
 
@@ -103,6 +104,63 @@ def test_findings_that_make_the_saved_model_worse_are_neither_named_nor_saved(he
     assert not {each["effect"] for each in found.not_visible} & {"cogging"}
 
 
+def test_the_search_is_repeated_without_the_laws_that_made_the_model_worse(monkeypatch):
+    """Until nothing is dropped; what no other law of its effect stands for is still said."""
+    effects = {"stiff": "backlash", "soft": "backlash", "lag": "frictional_lag"}
+    tried = []
+
+    def findings(laws):
+        names = frozenset(effects[law] for law in laws)
+        return types.SimpleNamespace(
+            selection=types.SimpleNamespace(forms=frozenset(laws), names=names)
+        )
+
+    def searched(motion, problem, seed, refused):
+        tried.append(set(refused))
+        return findings([law for law in ("stiff", "lag", "soft") if law not in refused][:2])
+
+    def judged(known, found, inputs, doing, seed):
+        kept = [law for law in found.selection.forms if law == "soft"]
+        gone = tuple(effects[law] for law in found.selection.forms - set(kept))
+        return None, improvement.Improved(
+            None, findings(kept), False, "before", "after", gone, "worse"
+        )
+
+    monkeypatch.setattr(explaining, "searched", searched)
+    monkeypatch.setattr(explaining, "_judged", judged)
+    _, better = explaining._found(None, None, None, None, 0, lambda stage: None)
+    assert tried == [set(), {"stiff", "lag"}]
+    assert better.findings.selection.forms == {"soft"}
+    assert better.dropped == ("frictional_lag",) and better.spoilt == "worse"
+
+
+@pytest.mark.slow
+def test_where_a_law_makes_the_model_worse_another_one_is_tried(healthy, monkeypatch):
+    run = planted(healthy[0], *CASES["cogging"])
+    first = explain(run, "gaussian")
+    here = improvement.Figures.here
+
+    def spoilt(figures, model, delay=None):
+        return here(figures, model) + 0.5 * (
+            model.parameters.keys() == first.model.parameters.keys()
+        )
+
+    monkeypatch.setattr(improvement.Figures, "here", spoilt)
+    found = explain(run, "gaussian")
+    never_worse(found)
+    assert [each.effect for each in found.findings] == ["cogging"]
+    assert found.findings[0].parameters.keys() != first.findings[0].parameters.keys()
+    pitch = found.findings[0].parameters["pitch"]
+    assert float(pitch.value) == pytest.approx(
+        float(first.findings[0].parameters["pitch"].value), rel=0.01
+    )
+    assert "not_better" not in names(found)
+    assert (
+        found.fit["filtered_force_error"]["after"]
+        < 0.2 * found.fit["filtered_force_error"]["before"]
+    )
+
+
 def test_what_is_worse_by_any_figure_is_worse():
     before = Errors(0.1, 0.2, 0.05, 0.06)
     assert before.worse(before, 1e-8) == []
@@ -181,6 +239,49 @@ PLAIN = {"inertia": 5.0} | {
     for sign in "+-"
     for name, value in {"coulomb": 20.0, "viscous": 60.0}.items()
 }
+
+
+def test_samples_beside_a_stop_or_a_reversal_do_not_count():
+    """The derivative of the momentum reaches into it: friction takes any value there, or jumps."""
+    time = np.arange(8000) * 1e-3
+    speed = np.where(time % 2.0 < 1.4, np.sin(2 * np.pi * time / 0.7), 0.0)  # stops for 0.6 s
+    position = np.round(np.cumsum(speed) * 1e-3, 6)
+    run = Recording(time, np.sign(speed), position)
+    motion = Prepared(run)
+    reach = motion.choice.half_width
+    moving = in_motion(run)
+    assert 2 < reach < 100
+    stands = (time % 2.0 > 1.41) & (time % 2.0 < 1.99)
+    assert not moving[stands].any()
+    starts = np.flatnonzero(np.diff(stands.astype(int)) == -1)
+    assert len(starts) and all(not moving[at : at + reach].any() for at in starts)
+    turn = np.argmin(np.abs(time - 0.35))
+    assert not moving[turn - reach + 2 : turn + reach - 2].any()
+    assert moving[turn + reach + 5 : turn + 2 * reach].all()
+    # An axis that hardly moves but beside stops has no other samples.
+    hops = np.where(time % 0.2 < 0.02, 1.0, 0.0)
+    hopping = Recording(time, hops, np.cumsum(hops) * 1e-3)
+    assert in_motion(hopping)[hops > 0].mean() > 0.5
+
+
+def test_a_force_for_what_is_beyond_the_end_does_not_count():
+    """Of a force that acts late the last samples are for a motion that was not recorded."""
+    time = np.arange(4000) * 1e-3
+    run = Recording(time, np.ones(4000), np.cumsum(1 + 0.5 * np.sin(5 * time)) * 1e-3)
+    assert in_motion(run).all()
+    late = in_motion(run, 0.0123)
+    assert late[:-13].all() and not late[-12:].any()
+    early = in_motion(run, -0.005)
+    assert early[6:].all() and not early[:5].any()
+
+
+def test_samples_that_are_not_valid_are_no_stop():
+    time = np.arange(4000) * 1e-3
+    mask = np.ones(4000, bool)
+    mask[2000:2100] = False
+    position = np.cumsum(1 + 0.5 * np.sin(5 * time)) * 1e-3
+    run = Recording(time, np.ones(4000), position, mask=mask)
+    assert np.array_equal(in_motion(run), mask)
 
 
 def test_what_lasts_or_is_usual_is_no_outlier(healthy):

@@ -101,6 +101,13 @@ def test_right_and_nothing_else_is_exact():
     assert found.reached == pytest.approx(0.05 / 0.06)
 
 
+def test_a_hard_limit_is_a_saturation():
+    found = scoring.score(
+        case("actuator_saturation"), sealed(actuator_saturation={}), answer(finding("force_limit"))
+    )
+    assert found.exact and found.named == ("actuator_saturation",) and found.beliefs[0].true
+
+
 def test_one_name_too_many_is_not_exact():
     found = scoring.score(
         case("cogging"), sealed(cogging={}), answer(finding("spring"), finding("cogging"))
@@ -152,6 +159,13 @@ def test_parameters_are_compared_where_the_names_coincide():
     # Eight degrees of freedom: 2.31 standard errors.
     assert [p.held for p in found.parameters] == [True, False]
     assert [p.error for p in found.parameters] == pytest.approx([0.1, 0.3])
+
+
+def test_of_an_effect_named_twice_the_strongest_is_compared():
+    truth = sealed(periodic_disturbance={"frequency": 2.0})
+    waves = [finding("periodic_disturbance", frequency=(f, 0.1)) for f in (2.1, 6.0)]
+    (parameter,) = scoring.score(case("periodic_disturbance"), truth, answer(*waves)).parameters
+    assert parameter.found == 2.1
 
 
 def test_where_the_oracle_gains_nothing_no_share_is_made_of_it():

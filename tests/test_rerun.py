@@ -66,6 +66,19 @@ def test_the_controller_is_read_off_the_log_and_the_loop_repeats_the_recording()
     assert off(model(damping=0.9), log, law) > 20 * off(model(), log, law)
 
 
+def test_a_controller_keeps_the_weight_that_it_knows():
+    """Of one joint a wrong mass with a gain is the right one: the command is the same."""
+    log, heavy = driven(model()), model().replace('mass="1"', 'mass="1.5"')
+    laws = [
+        closed.law_of(mujoco, mujoco.MjModel.from_xml_string(text), log)
+        for text in (model(), heavy)
+    ]
+    assert laws[1].gains[0, 2] == pytest.approx(laws[0].gains[0, 2] / 1.5, rel=1e-3)
+    for law in laws:
+        assert off(model(), log, law) < 2e-4
+    assert off(heavy, log, laws[0]) > 20 * off(model(), log, laws[0])
+
+
 def test_a_command_that_is_no_law_of_the_reference_is_told():
     log = driven(model())
     noise = np.random.default_rng(0).normal(size=log.force.shape)

@@ -62,6 +62,14 @@ def sticking(**options):
     return recorded(x, LEVEL * direction * (1 - 2 * waited), **options)
 
 
+def creeping(**options):
+    """Friction that is steep about zero velocity, as simulators regularise it: it creeps over."""
+    x, _, _ = path(DISTANCE)
+    speed = np.gradient(x, TIME)
+    steep = 2e-3 * np.quantile(np.abs(speed), 0.98)
+    return recorded(x, LEVEL * np.tanh(speed / steep), **options)
+
+
 def yields(recording, seen=None):
     seen = seen or evidence.gather(motion_of(recording))
     base = regression.fit([named("symmetric-coulomb-viscous")], seen)
@@ -73,6 +81,17 @@ def test_an_axis_that_yields_is_told_from_one_that_sticks(force_unit, unit):
     for seed in range(3):
         assert yields(yielding(seed=seed, force_unit=force_unit, unit=unit))
         assert not yields(sticking(seed=seed, force_unit=force_unit, unit=unit))
+
+
+@pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])
+def test_an_axis_that_creeps_over_is_told_from_one_that_yields(force_unit, unit):
+    """Below the slowest speed that is told from rest it is no friction over a distance."""
+    for make, creeps in ((yielding, False), (creeping, True)):
+        motion = motion_of(make(force_unit=force_unit, unit=unit))
+        problem = problem_of(motion, named("symmetric-coulomb-viscous"))
+        rows = evidence.gather(motion, problem.evidence.width, problem.delay, True)
+        base = regression.fit([problem.structure], rows)
+        assert reversals.creeps(rows, base) == creeps
 
 
 def test_the_mirror_of_a_recording_says_the_same():
@@ -117,7 +136,7 @@ def hilly(seed=0):
 
 def searched(recording):
     problem = problem_of(recording, named("symmetric-coulomb-viscous"))
-    return search._selected(motion_of(recording), problem, 0)
+    return search._selected(motion_of(recording), problem, 0, frozenset())
 
 
 def names(found):
@@ -137,8 +156,17 @@ def test_what_does_not_act_at_reversals_is_found_without_them():
 
 
 @pytest.mark.slow
+def test_reversals_that_are_left_out_since_the_axis_creeps_are_told():
+    found = explain(creeping(), "symmetric-coulomb-viscous", creeping(seed=1))
+    (remark,) = [each for each in found.warnings if each["name"] == "creeps"]
+    assert not remark["severe"] and " m/s it is not told from a jump" in remark["text"]
+    told = explain(sticking(), "symmetric-coulomb-viscous", sticking(seed=1)).warnings
+    assert "creeps" not in {each["name"] for each in told}
+
+
+@pytest.mark.slow
 def test_an_axis_that_sticks_is_asked_once():
     recording = sticking()
     problem, found = searched(recording)
     assert not problem.reversals and found.in_slip is None
-    assert across_reversals(recording, problem) is None
+    assert across_reversals(recording, problem) is problem

@@ -86,6 +86,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert "jaxfric select" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_model_may_be_spelled_as_its_function():
     recording = jf.scenario.record(jf.scenario.machine(), force_noise=0.5, key=jax.random.key(0))
     spelled = jf.select(recording, ["coulomb_viscous", "lorentzian"])

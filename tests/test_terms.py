@@ -27,7 +27,7 @@ from jaxfric.terms import (  # fmt: skip
     Sum,
     Viscous,
 )
-from jaxfric.terms.base import bounds, summands
+from jaxfric.terms.base import bounds, changed_columns, summands
 from jaxfric.terms.sample import Scales
 from jaxfric.units import FORCE, VELOCITY
 
@@ -120,6 +120,16 @@ def test_derivative_by_beta_agrees_with_finite_differences(term):
         step = jnp.zeros_like(beta).at[i].set(1e-5 * size)
         expected = (columns(beta + step) - columns(beta - step)) / (2e-5 * size)
         np.testing.assert_allclose(slopes[..., i], expected, rtol=1e-6, atol=1e-8)
+
+
+@each_term
+def test_a_nonlinear_parameter_changes_its_own_columns_and_no_others(term):
+    beta, recording = term.beta(), motion()
+    before = np.asarray(term.columns(recording))
+    for i, own in enumerate(changed_columns(term)):
+        moved = term.with_beta(beta.at[i].multiply(1.1)).columns(recording)
+        changed = np.flatnonzero(np.any(np.asarray(moved) != before, axis=0))
+        assert len(changed) and set(changed) <= set(own)
 
 
 # ---- structure ----

@@ -53,10 +53,11 @@ def fitted(design: Design, force_error: float) -> np.ndarray:
     if not (np.isfinite(power) and np.isfinite(energy)) or power == 0:
         return places({})
     # What turns the columns into each other takes little off the residual and much from the truth.
-    found = _slightly_late(design, rows, columns, energy, power)
-    found |= found or _gain(columns, target, left)
+    basis = np.linalg.qr(columns)[0]
+    found = _slightly_late(design, rows, basis, energy, power)
+    found |= found or _gain(basis, target, left)
     if not found and energy > MATTERS**2 * power:
-        found |= _late(design, rows, columns, energy, power)
+        found |= _late(design, rows, basis, energy, power)
         found |= found or _split(columns, target, left, np.asarray(design.time)[rows], power)
     if force_error > LEFT and np.sqrt(energy) > max(LEFT * np.sqrt(power), ROUGH * _rough(left)):
         found["structure_left"] = force_error
@@ -70,7 +71,7 @@ def fitted(design: Design, force_error: float) -> np.ndarray:
 ONE_SIGN = 0.01
 
 
-def _gain(columns, target, left) -> dict[str, float]:
+def _gain(basis, target, left) -> dict[str, float]:
     """The gain of the positive force, where one of its own leaves half of the residual.
 
     Noise alone never gives half: what of it is in the positive force is half of it at most.
@@ -79,7 +80,6 @@ def _gain(columns, target, left) -> dict[str, float]:
     powers = float(positive @ positive), float(target @ target)
     if not ONE_SIGN * powers[1] < powers[0] < (1 - ONE_SIGN) * powers[1]:
         return {}
-    basis = np.linalg.qr(columns)[0]
     own = positive - basis @ (basis.T @ positive)
     size = float(own @ own)
     if size <= 1e-6 * powers[0]:
@@ -116,7 +116,7 @@ def _least(columns: np.ndarray, target: np.ndarray) -> float:
     return float(rest @ rest)
 
 
-def _slightly_late(design: Design, rows, columns, energy, power) -> dict[str, float]:
+def _slightly_late(design: Design, rows, basis, energy, power) -> dict[str, float]:
     """A delay of less than a row, by its first order: u(t + τ) = u + τ du/dt.
 
     Half a sample of it is damping to a light, fast axis.
@@ -126,7 +126,6 @@ def _slightly_late(design: Design, rows, columns, energy, power) -> dict[str, fl
     if not np.all(np.diff(time) > 0):
         return {}
     slope = np.gradient(whole, time)[rows]
-    basis = np.linalg.qr(columns)[0]
     own = slope - basis @ (basis.T @ slope)
     size = float(own @ own)
     if size <= 1e-6 * float(slope @ slope):
@@ -139,7 +138,7 @@ def _slightly_late(design: Design, rows, columns, energy, power) -> dict[str, fl
     return {}
 
 
-def _late(design: Design, rows, columns, energy, power) -> dict[str, float]:
+def _late(design: Design, rows, basis, energy, power) -> dict[str, float]:
     """By how much the force is late, where taking it earlier leaves half of the residual.
 
     To first order in the nonlinear parameters, whose columns are among the others.
@@ -149,7 +148,6 @@ def _late(design: Design, rows, columns, energy, power) -> dict[str, float]:
     if not np.all(np.diff(time) > 0):
         return {}
     known = whole[rows] - np.asarray(design.left, float)[rows]
-    basis = np.linalg.qr(columns)[0]
     # Whole rows: halfway between two of them their noise would be less.
     spacing = float(np.median(np.diff(time)))
     ladder = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512])

@@ -4,7 +4,6 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
-from ..signals.polynomial import white_noise
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
@@ -148,7 +147,7 @@ def _increments(recording: Recording, clock: Clock) -> tuple[np.ndarray, np.ndar
     mean = np.where(linked, 0.5 * (velocity[1:] + velocity[:-1]), 0.0)
     moved = np.concatenate([[0], np.cumsum(np.where(linked, np.diff(position), 0.0))])
     driven = np.concatenate([[0], np.cumsum(mean * steps)])
-    noise, span = white_noise(position[np.asarray(recording.mask)]), 4
+    noise, span = signals.counted_noise(position[np.asarray(recording.mask)]), 4
     while (
         span < len(moved) // 16
         and float(np.std(moved[span:] - moved[:-span])) < ABOVE_NOISE * noise

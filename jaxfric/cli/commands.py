@@ -32,7 +32,7 @@ from ..identification.selection import Selection
 from ..looks.text import text
 from ..models import Model
 from ..signals import kernel_half_width, prepare
-from ..simulation.prediction import delay_of, force_error, in_motion, relative, residual
+from ..simulation.prediction import arrived, delay_of, force_error, in_motion, relative, residual
 from ..units import SI
 from .messages import message, say
 from .saving import saved
@@ -257,10 +257,14 @@ def predict(arguments: Namespace) -> int:
         )
     left, moving = residual(model, recording), in_motion(recording, delay_of(model))
     notes = notes + _unknown(model, ~np.isfinite(left), moving, arguments)
-    measured = np.asarray(recording.force)
-    force = measured - left
+    measured, acting = np.asarray(recording.force), arrived(model, recording)
+    force = acting - left
     columns = {"time": recording.time, "force": force, "measured_force": measured}
-    error = relative(left[moving], measured[moving])
+    if model.force_limit is not None:
+        columns["arrived_force"] = acting
+        limit = f"{float(model.force_limit):.5g} {dict(model.units)['force']}"
+        notes = [*notes, f"The measured force counts up to the model's force limit, {limit}."]
+    error = relative(left[moving], acting[moving])
     share = f"{error:.2%}" if np.isfinite(error) else "undefined: no slip, or no force"
     columns["in_motion"] = moving.astype(int)
     notes = [stated(recording), *notes]

@@ -16,7 +16,7 @@ from ..data.recording import Recording
 from ..data.tables import load
 from ..data.targets import standard
 from ..explanation import Explanation, explain
-from ..explanation.sanity import Check, Looked, Part, look
+from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -101,12 +101,12 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
         opened = {
             name: _opened(name, shared, logs, columns, arguments, hinges[name]) for name in chosen
         }
-        looked = _looked(opened)
+        checked = _checked(opened)
         for name in reversed(chosen):
             doing(f"joint {name}")
-            one = _joint(opened[name], looked.get(name), source, shared, arguments)
+            one = _joint(opened[name], checked.get(name), source, shared, arguments)
             said = [
-                f"{c.attribute} at {float(c.value.value):.5g}" for c in _of_others(name, looked)
+                f"{c.attribute} at {float(c.value.value):.5g}" for c in _of_others(name, checked)
             ]
             found.insert(0, one._replace(corrected=(*said, *corrected)))
             if bodies := _bodies(one):
@@ -148,7 +148,7 @@ def _refusal(error: ValueError, paths: Sequence[str]) -> str:
     return text if text.startswith(tuple(paths)) else f"{paths[0]}: {text}"
 
 
-def _looked(opened: Mapping[str, Joint]) -> dict[str, Looked]:
+def _checked(opened: Mapping[str, Joint]) -> dict[str, CheckedSimulator]:
     """What all joints' logs differ in from the simulator that no physics is."""
     able = [joint for joint in opened.values() if joint.simulator is not None]
     parts = [
@@ -161,14 +161,14 @@ def _looked(opened: Mapping[str, Joint]) -> dict[str, Looked]:
         for joint in able
     ]
     try:
-        return {part.name: own for part, own in zip(parts, look(parts), strict=True)}
+        return {part.name: own for part, own in zip(parts, check_logs(parts), strict=True)}
     except ValueError:  # a joint that does not move is told of by itself
         return {}
 
 
-def _of_others(name: str, looked: Mapping[str, Looked]) -> list[Check]:
+def _of_others(name: str, checked: Mapping[str, CheckedSimulator]) -> list[Check]:
     """What is wrong elsewhere that this joint's simulator is judged with: zeros of other joints."""
-    own = looked.get(name)
+    own = checked.get(name)
     checks = own.checks if own is not None else []
     return [
         c
@@ -177,24 +177,26 @@ def _of_others(name: str, looked: Mapping[str, Looked]) -> list[Check]:
     ]
 
 
-def _joint(joint: Joint, looked: Looked | None, source, shared, arguments: Namespace) -> Joint:
+def _joint(
+    joint: Joint, checked: CheckedSimulator | None, source, shared, arguments: Namespace
+) -> Joint:
     """One joint explained, its bodies as they were corrected by those farther out."""
     if joint.simulator is None:
         return joint
     logs = joint.logs
     held = logs[1] if len(logs) > 1 else None
     try:
-        zeros = looked.faults.zeros if looked is not None else {}
+        zeros = checked.faults.zeros if checked is not None else {}
         commanded = joint.simulator.actuator is not None
         folder = folder_of(arguments.mujoco)
         simulator = Mujoco(source, joint.name, folder, shared, zeros, commanded)
-        baseline = simulator if looked is None else looked.standing_on(simulator)
+        baseline = simulator if checked is None else checked.standing_on(simulator)
         told = explain(logs[0], baseline, held, simulate=arguments.simulate)
     except ValueError as error:
         return joint._replace(error=_refusal(error, [log.source for log in logs]))
-    if looked is not None and looked.changed:
-        logs = [log for log in (looked.part.recording, looked.part.holdout) if log is not None]
-        if looked.faults.clock:
+    if checked is not None and checked.changed:
+        logs = [log for log in (checked.part.recording, checked.part.holdout) if log is not None]
+        if checked.faults.clock:
             joint = joint._replace(commanded=logs[0])
     return joint._replace(told=told, simulator=simulator, logs=logs)
 

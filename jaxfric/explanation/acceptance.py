@@ -21,7 +21,8 @@ LATER_SHARE = 0.05
 # A later term must also remove this part of the base's residual, or a third of what the earlier
 # terms leave: no term has quite the shape of its effect, and a tenth of its amplitude may remain.
 # No other law has the shape of that remainder, so that it removes less than a third of it. Below a
-# hundredth of the amplitude no force is known to follow its law.
+# hundredth of the amplitude no force is known to follow its law. But what a law over time leaves is
+# of time, too, and a wave, a step or pushes take a third of it: for those there is no such ease.
 OF_BASE, LEAST_OF_BASE = 0.01, 1e-4
 MOST = 1 / 3
 # The linearity of a good torque or current sensor, relative: a force below it, with respect to the
@@ -62,7 +63,9 @@ def accepted(
         if effect.ubiquitous:
             enough &= gained >= fast(current) ** 2 * len(current.residual)
         if selected:
-            enough &= gained >= least_gain(effect, before, base.energy, current.energy)
+            enough &= gained >= least_gain(
+                effect, before, base.energy, current.energy, LEAST_OF_BASE
+            )
             enough &= not _again(finalist, selected)
         level = RAREST if effect.sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
@@ -80,13 +83,15 @@ def least_gain(
     before: Sequence[Effect],
     base: float,
     remaining: float,
-    floor: float = LEAST_OF_BASE,
+    floor: float,
 ) -> float:
     """The energy that a term after others must remove, N².
 
     **Arguments:** `before`: the effects selected already; `base` and `remaining`: the energy of the
     residual of the base, and beside those effects; `floor`: the least part of the base's.
     """
+    if effect.momentary and any(earlier.momentary for earlier in before):
+        return OF_BASE * base
     again = any(earlier.at_reversals for earlier in before)
     if again and (effect.at_reversals or effect.isolated):
         return min(REVERSAL_OF_BASE * base, NEARLY_ALL * remaining)

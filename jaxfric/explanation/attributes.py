@@ -11,7 +11,7 @@ from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation
 from .finding import Finding, Moved
-from .sentences import quantity
+from .sentences import indistinct, quantity
 
 # Corrections that are no attribute by themselves.
 GAIN, CONSTANT = "gain", "offset"
@@ -55,14 +55,22 @@ def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
         text + _doubt(name, m, finding.instead, own)
         for text, (name, m) in zip(texts, moved.items(), strict=True)
     ]
-    share = f"{finding.share:.0%} of the unexplained force"
+    rivals = tuple(r for r in finding.confusable_with if not _same(r, moved))
+    share = f"{finding.share:.0%} of the unexplained force{indistinct(rivals)}"
     geared = {_gear(own)} - {GAIN}
     names = [n for n in moved if n in own or n in geared or n.endswith(REFERENCE)]
     return finding._replace(
         parameters=moved,
+        confusable_with=rivals,
         sentence=f"Wrong in the simulator: {'; '.join(texts)}; {share}.",
         attribute=", ".join(names) or None,
     )
+
+
+def _same(rival: str, moved: Mapping[str, Moved]) -> bool:
+    """Whether an effect is what a wrong attribute says: a spring that is the joint's stiffness."""
+    springs = any(law.in_joint == "spring" for law in EFFECTS[rival].laws)
+    return springs and any(name.endswith(f"/{STIFFNESS}") for name in moved)
 
 
 def _attributes(moved: Mapping[str, Moved], own: Mapping[str, Attribute]) -> dict[str, Moved]:
@@ -166,12 +174,9 @@ def _stepped(finding: Finding, own: Mapping[str, Attribute], now: Mapping[str, f
         f"{before:.4g} to {value}{_doubt(key, moved, instead, own)}{reason and f': {reason}'}; "
         f"{finding.share:.0%} of the unexplained force"
     )
-    if finding.confusable_with:
-        rivals = " or ".join(rival.replace("_", " ") for rival in finding.confusable_with)
-        text += f". This recording cannot tell it from {rivals}"
     return finding._replace(
-        parameters={**finding.parameters, key: moved}, sentence=f"{text}.", attribute=key,
-        instead=instead,
+        parameters={**finding.parameters, key: moved}, attribute=key, instead=instead,
+        sentence=f"{text}{indistinct(finding.confusable_with)}.",
     )  # fmt: skip
 
 

@@ -78,11 +78,23 @@ def at_values(model: Model, evidence: Evidence) -> Fit:
     return start._replace(columns=columns, residual=residual, energy=float(residual @ residual))
 
 
-def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ...] = ()) -> Fit:
+def refitted(
+    evidence: Evidence, known: Fit, model: Model | None, free: tuple[int, ...], iterations: int
+) -> Fit:
+    """A fit fitted again to other rows of the machine; with `model`, as [`as_given`][]."""
+    if model is not None:
+        return as_given(model, known, evidence, free, iterations)
+    return fit(known.terms, with_predictions(evidence, known), known.betas, iterations)
+
+
+def as_given(
+    model: Model, current: Fit, evidence: Evidence, free: tuple[int, ...] = (), iterations: int = 6
+) -> Fit:
     """A fit with its base, the first term, at the model's own values, the others fitted beside.
 
     `free`: parameters of the base that are fitted too, numbers among affine and nonlinear ones. The
-    derivatives are those of all parameters, which say what these values are worth.
+    derivatives are those of all parameters, which say what these values are worth. `iterations`: of
+    the others' β.
     """
     given, others = at_values(model, evidence), current.terms[1:]
     count = len(given.alphas[0])
@@ -96,7 +108,7 @@ def as_given(model: Model, current: Fit, evidence: Evidence, free: tuple[int, ..
         if others and not free:
             beside = seen._replace(target=given.residual)
             current = current._replace(
-                betas=(searched, *fit(others, beside, current.betas[1:], 6).betas)
+                betas=(searched, *fit(others, beside, current.betas[1:], iterations).betas)
             )
         current = fit(current.terms, seen, (searched, *current.betas[1:]), 0)
         alpha = np.zeros(current.columns.shape[1])

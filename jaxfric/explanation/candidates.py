@@ -1,9 +1,10 @@
 """The terms that compete for a residual, with grids of their nonlinear parameters."""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from ..data.recording import Recording
@@ -36,6 +37,11 @@ class Candidate(NamedTuple):
     betas: np.ndarray
     lines: SpectralLines | None = None
     least: float = 0.0
+
+    @property
+    def form(self) -> Hashable:
+        """The form of its law: what of it is no value."""
+        return jax.tree.structure(self.term)
 
     def columns(self, evidence: Evidence) -> np.ndarray:
         """The rows of its columns at every grid point, `(G, J, k)`."""

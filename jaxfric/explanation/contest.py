@@ -27,7 +27,7 @@ class Trial(NamedTuple):
 
     `gain`: R²; `null_mean`: its mean over the draws; `dimension`: how many of its columns are new;
     `threshold`: the R² from which it is significant; `new_part`: the part of the term's force, in
-    amplitude, that the model cannot imitate.
+    amplitude, that the model cannot imitate; `others`: further local optima of its grid.
     """
 
     candidate: Candidate
@@ -38,6 +38,7 @@ class Trial(NamedTuple):
     p_value: float
     threshold: float
     new_part: float
+    others: tuple[np.ndarray, ...] = ()
 
     @property
     def effect(self) -> Effect:
@@ -136,7 +137,31 @@ def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
     return Trial(
         candidate, candidate.betas[best], float(scan.gain[best]), float(scan.null_mean[best]),
         int(scan.dimension[best]), p_value, limit, float(new_part),
+        _optima(candidate.betas, scan.gain),
     )  # fmt: skip
+
+
+# Further local optima of a grid from which a law is refined, of at least half the best one's R².
+FURTHER, NEARLY = 3, 0.5
+
+
+def _optima(betas: np.ndarray, gain: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The best local optima of a grid `(G, d)` over several parameters, but for the very best.
+
+    None of their neighbours, one step away in some or all parameters, is better. A grid over one
+    parameter resolves it: its best point is next to the optimum.
+    """
+    if betas.shape[1] < 2:
+        return ()
+    steps = np.stack([np.unique(each, return_inverse=True)[1] for each in betas.T], axis=1)
+    found: list[np.ndarray] = []
+    for number in np.argsort(-gain, kind="stable")[1:]:
+        near = np.all(np.abs(steps - steps[number]) <= 1, axis=1)
+        if len(found) == FURTHER or gain[number] <= NEARLY * gain.max():
+            break
+        if gain[number] >= gain[near].max():
+            found.append(betas[number])
+    return tuple(found)
 
 
 def _finals(seen: Evidence, current: Fit, trials: list[Trial], size: float) -> list[Finalist]:
@@ -199,7 +224,9 @@ def _overtone(trial: Trial, found: Finalist) -> Trial:
 
 def _refined(seen, current, trial, basis) -> Finalist:
     """The candidate refined, the rest of the model fitted along to first order."""
-    found = fit([trial.candidate.term], seen, [trial.beta], 8, basis)
+    term = trial.candidate.term
+    fits = (fit([term], seen, [beta], 8, basis) for beta in (trial.beta, *trial.others))
+    found = min(fits, key=lambda each: each.energy)
     betas = (*current.betas, found.betas[0])
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
 

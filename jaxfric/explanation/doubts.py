@@ -8,14 +8,18 @@ from .. import terms as laws
 from ..checks import Remark
 from ..identification.uncertainty import Estimate
 from ..terms.base import summands
+from ..units import VELOCITY, spell
 from .evidence import Evidence
 from .intervals import covariance
 from .nodes import NODES
 from .problem import Problem
+from .quantities import quantity, rise
 from .regression import Fit
 
 # A remark by which the baseline is what is reported.
 NOT_BETTER = "not_better"
+# One by which nothing at reversals was judged.
+CREEPS = "creeps"
 # Standard errors in half a 95 % interval, as in the findings' sentences.
 HALF_WIDTH = 2.0
 # More than half of the force's power: the model is further from the force than no force at all is
@@ -221,12 +225,25 @@ def not_better(gone: tuple[str, ...], before: Any, spoilt: Any) -> Remark:
     }
     which = spoilt.worse(before, 0.0)
     changes = [
-        f"{figures[name]} from {getattr(before, name):.2%} to {getattr(spoilt, name):.2%}"
+        f"{figures[name]} from {rise(getattr(before, name), getattr(spoilt, name))}"
         for name in which[:2]
     ] or ["the force error up over the samples in which it moves"]
     return Remark(
         NOT_BETTER,
         f"The structure that was seen has the shape of {names}, but with that the model is worse: "
         f"it takes {' and '.join(changes)}. It is neither named nor saved.",
+        False,
+    )
+
+
+def creeping(problem: Problem) -> Remark:
+    """That reversals were left out, since the axis creeps through them."""
+    motion = problem.evidence.motion
+    slowest = Estimate(problem.evidence.limits.slowest, 0.0, spell(VELOCITY, motion.unit_names))
+    return Remark(
+        CREEPS,
+        "The axis moves while its friction reverses, as with a friction that is steep about zero "
+        f"velocity: below {quantity(slowest)} it is not told from a jump. So reversals were left "
+        "out, and presliding, backlash or compliance that shows at reversals alone is not seen.",
         False,
     )

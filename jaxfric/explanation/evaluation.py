@@ -17,9 +17,11 @@ from ..terms import KNOWN
 from ..terms.base import AbstractTerm
 
 # Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
-# neighbour that gives its derivative; of a load that is stepped along the motion many at once, as
-# four times as many steps side by side take hardly longer.
-BATCH, PAIR, STEPPED = 8, 2, 32
+# neighbour that gives its derivative.
+BATCH, PAIR = 8, 2
+# Of a load that is stepped along the motion: of a grid, or one with all neighbours that give its
+# derivatives, as eight steps side by side take hardly longer than two.
+STEPPED, NEIGHBOURS = 32, 8
 
 
 def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
@@ -37,6 +39,11 @@ def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
     form = _renumbered(term, take)
     motion = without_known(motion, term.coordinates)
     return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
+
+
+def sizes(term: AbstractTerm) -> tuple[int, int]:
+    """How many β one compiled call takes: of few, and of many."""
+    return (NEIGHBOURS, STEPPED) if term.stepped else (PAIR, BATCH)
 
 
 def without_known(motion: Recording, kept: frozenset[str] = frozenset()) -> Recording:

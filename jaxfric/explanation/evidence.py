@@ -19,7 +19,7 @@ from ..data.recording import Recording
 from ..terms import KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
 from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
-from .evaluation import BATCH, PAIR, STEPPED, evaluate
+from .evaluation import BATCH, PAIR, evaluate, sizes
 from .motion import Motion, derived, motion_of
 from .nodes import NODES, STRIDE, averaged, node_signals, padded, windows
 
@@ -78,10 +78,10 @@ class Evidence(NamedTuple):
         if term.switched is not None:
             return self._switched(term, betas)
         parts = []
-        most = STEPPED if term.stepped else BATCH
+        few, most = sizes(term)
         for start in range(0, len(betas), most):
             some = betas[start : start + most]
-            size = PAIR if len(some) <= PAIR else most
+            size = few if len(some) <= few else most
             full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
             plain, momentum = evaluate(term, full, self.motion)
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]

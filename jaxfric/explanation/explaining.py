@@ -1,12 +1,13 @@
 """The verb: locate where a model and a recording differ, name what is missing, verify it."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 
 import jax
 import numpy as np
 
 from ..checks import Remark
+from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..identification.identified import Identified
 from ..models import Model, named
@@ -26,7 +27,8 @@ from .holdout import check_signals, confirmed
 from .improvement import Improved, improved
 from .inputs import Inputs, as_seen, prepare
 from .mismatch import Mismatch, mismatch
-from .motion import motion_of
+from .motion import Motion, motion_of
+from .parsimony import instead
 from .problem import Problem, problem_of, with_holdout
 from .search import at_given, nothing, obeying, searched
 from .summary import facts, summarise
@@ -75,7 +77,7 @@ def explain(
 
 def _finished(found: Explanation, inputs: Inputs) -> Explanation:
     """The explanation in the caller's precision, and in the words of the simulator, if any."""
-    recording, looked = shortened(inputs.recording), inputs.looked
+    recording, checked = shortened(inputs.recording), inputs.checked
     models = {
         name: None if model is None else as_seen(inputs.figures.own(model), recording)
         for name in ("model", "baseline", "holdout_model")
@@ -90,7 +92,7 @@ def _finished(found: Explanation, inputs: Inputs) -> Explanation:
         holdout=holdout,
     )  # fmt: skip
     found = in_own_words(found, inputs.attributes) if inputs.attributes else found
-    return found if looked is None else sanity.told(found, looked, inputs.figures.x64)
+    return found if checked is None else sanity.with_checks(found, checked, inputs.figures.x64)
 
 
 def _explain(
@@ -102,19 +104,23 @@ def _explain(
     known = _known(baseline, seed)
     motion, held = motion_of(recording), None if holdout is None else motion_of(holdout)
     problem = problem_of(motion, known.structure)
+    bound = None
+    if inputs.checked is None and not inputs.arrived:
+        bound = sanity.bounded(motion, problem, known.model, held)
+    if bound is not None:
+        for candidates in problem.candidate_sets:
+            candidates.close()
+        found = _explain(inputs.cut_off(bound.limit), simulate, seed, doing)
+        return sanity.with_limit(found, bound, inputs.figures)
     if held is not None:
         with_holdout(problem, held)  # says what is wrong with it before anything takes time
     if known.fit is not None:
         known = rephased(known, problem.evidence)
     remarks = [*inputs.remarks, *_contradictions(problem)]
     if any(remark.severe for remark in remarks):
-        findings, wrong = nothing(problem), None
+        wrong, better = _judged(known, nothing(problem), inputs, doing, seed)
     else:
-        doing("looking for what is missing")
-        findings = searched(motion, problem, seed)
-        doing("testing the baseline's values")
-        wrong = _wrong(known, findings, recording, seed)
-    better = _improved(known, findings, wrong, inputs, doing)
+        wrong, better = _found(known, motion, problem, inputs, seed, doing)
     if held is not None:
         doing("validating on the held-out recording")
         check_signals(better.findings.selection, recording, holdout)
@@ -144,31 +150,75 @@ def _contradictions(problem: Problem) -> list[Remark]:
     return [] if remark is None else [remark]
 
 
-def _wrong(known: Baseline, findings: Findings, recording: Recording, seed: int) -> Mismatch | None:
+def _found(
+    known: Baseline, motion: Motion, problem: Problem, inputs: Inputs, seed: int,
+    doing: Callable[[str], None],
+) -> tuple[Mismatch | None, Improved]:  # fmt: skip
+    """What is missing and which values are wrong, by laws that do not make the model worse.
+
+    A law may fit the rows and go astray beside them, where another of its effect does not.
+    """
+    refused, rounds = frozenset[Hashable](), list[Improved]()
+    while True:
+        doing("looking for what is missing")
+        findings = searched(motion, problem, seed, refused)
+        wrong, better = _judged(known, findings, inputs, doing, seed)
+        rounds.append(better)
+        gone = findings.selection.forms - better.findings.selection.forms
+        if not better.dropped or gone <= refused:  # a late force is looked for in another way
+            return wrong, better if len(rounds) == 1 else _with_dropped(better, rounds)
+        refused |= gone
+
+
+def _with_dropped(better: Improved, rounds: list[Improved]) -> Improved:
+    """With the effects that any round dropped and that no other law of theirs stands for."""
+    names = dict.fromkeys(name for each in rounds for name in each.dropped)
+    dropped = tuple(name for name in names if name not in better.findings.selection.names)
+    return better._replace(dropped=dropped, spoilt=rounds[0].spoilt if dropped else None)
+
+
+def _judged(
+    known: Baseline, findings: Findings, inputs: Inputs, doing: Callable[[str], None], seed: int
+) -> tuple[Mismatch | None, Improved]:
+    """The baseline's wrong values beside the findings, and which of both make the model better."""
+    doing("testing the baseline's values")
+    wrong = _wrong(known, findings, seed)
+    searched_for = findings.selection.remaining.trials and not findings.selection.selected
+    if wrong is not None and searched_for:
+        one, rivals = instead(known.model, findings, wrong, seed)
+        wrong = wrong._replace(rivals=rivals)
+        if one is not None and _wrong(known, one, seed) is None:
+            findings, wrong = one, None
+    doing("predicting with the improved model")
+    return wrong, _improved(known, findings, wrong, inputs)
+
+
+def _wrong(known: Baseline, findings: Findings, seed: int) -> Mismatch | None:
     """Which of the baseline's own values are wrong, where it has any."""
     if known.model is None:
         return None
     problem, selection = findings.undelayed
-    wrong = mismatch(known.model, selection.last, problem.evidence, seed)
+    wrong = mismatch(known.model, selection.last, problem.evidence, problem.wide, seed)
     if wrong is None or known.errors is None:
         return wrong
-    here = spelled.estimates(selection.last, problem.block, recording.unit_names)[0]
+    units = problem.evidence.motion.unit_names
+    here = spelled.estimates(selection.last, problem.block, units)[0]
     names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
     return changed(wrong, known, selection.last, [float(here[n].standard_error) for n in names])
 
 
 def _improved(
-    known: Baseline, findings: Findings, wrong: Mismatch | None, inputs: Inputs,
-    doing: Callable[[str], None],
-) -> Improved:  # fmt: skip
+    known: Baseline, findings: Findings, wrong: Mismatch | None, inputs: Inputs
+) -> Improved:
     """The findings beside the baseline's values as given or refitted, where the model is better."""
-    if known.model is not None and (wrong is not None or inputs.fixed):
+    fixed = inputs.fixed and not findings.selection.trusted
+    if known.model is not None and (wrong is not None or fixed):
         findings = at_given(known.model, findings, () if wrong is None else tuple(wrong.moved))
     first = findings.selection.base
     if wrong is not None:
         first = at_values(known.model, findings.problem.evidence)
-    doing("predicting with the improved model")
-    for problem in (findings.problem, findings.undelayed.problem):
-        for candidates in problem.candidate_sets:
-            candidates.forget()  # the predictions of a long recording need the memory
+    if inputs.recording.num_samples > MOST:  # whose predictions need the memory
+        for problem in (findings.problem, findings.undelayed.problem):
+            for candidates in problem.candidate_sets:
+                candidates.forget()
     return improved(first, findings, inputs.figures)

@@ -58,7 +58,8 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     if better.after.worse(better.before, figures.rounding) and tested != better.refuted:
         borne_out = better.findings.selection.selected
         others = [n for n, selected in enumerate(borne_out) if selected.confirmed]
-        better = _refuting(better, better.findings, others)._replace(refuted=tested)
+        worse = better.before, better.after
+        better = _refuting(better, better.findings, others)._replace(refuted=tested, worse=worse)
         better = _measured(better, figures)
     if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
         better = _measured(_without_nil(_at_base_values(better)), figures)
@@ -156,6 +157,6 @@ def _nil_in_both(findings: Findings) -> list[bool]:
     """Whether each finding's force may as well be none, by what both recordings say of it."""
     selection = findings.selection
     start = selection.term_index(0)
-    values = estimated(findings)[start:] if selection.selected else []
+    values = estimated(findings, shaped=True)[start:] if selection.selected else []
     terms = selection.last.terms[start:]
     return [spelled.may_be_none(*pair) for pair in zip(terms, values, strict=True)]

@@ -42,7 +42,8 @@ class Improved(NamedTuple):
     - `dropped`: effects whose findings were dropped, as the model with them is worse; `spoilt`: its
       errors.
     - `claimed`: the findings that the recording shows, of which the held-out recording does not
-      confirm those of the numbers `refuted`.
+      confirm those of the numbers `refuted`; `worse`: the errors before and with them, where what
+      each of them removes there is confirmed, but the model with them is worse.
     """
 
     first: Fit
@@ -54,6 +55,7 @@ class Improved(NamedTuple):
     spoilt: Errors | None = None
     claimed: Findings | None = None
     refuted: tuple[int, ...] = ()
+    worse: tuple[Errors, Errors] | None = None
 
 
 def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
@@ -61,6 +63,10 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
 
     By either figure, over the same samples. The one goes without which the force error is least.
     """
+    if findings.selection.given is not None:
+        # Beside values as given, what only refitted values had called for removes nothing.
+        while (less := _without_idle(findings)) is not None:
+            findings = less
     claimed, base = findings, findings.at_base(first)
     refitted = first is not findings.selection.base
     spoilt = None
@@ -95,7 +101,7 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
 
 
 def _without_idle(findings: Findings) -> Findings | None:
-    """Without a finding that by itself removes too little, once one beside it was dropped."""
+    """Without a finding that by itself removes too little; `None` where there is none."""
     energy = findings.undelayed.selection.last.energy
     for number in range(len(findings.selection.selected)):
         less = findings.without(number)

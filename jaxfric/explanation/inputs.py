@@ -12,6 +12,7 @@ from ..checks import Remark
 from ..data.cleaning import between_updates, held_for
 from ..data.recording import Recording, check_same_units, require, require_force
 from ..identification.identified import Identified
+from ..identification.uncertainty import Estimate
 from ..models import NAMED, Model
 from ..simulation.prediction import outliers, unseen
 from ..simulators import AbstractSimulator, Attribute, Known, same_motion
@@ -22,7 +23,7 @@ from .baseline import baseline_of
 from .earlier import Earlier
 from .evidence import shortened
 from .figures import Figures, cast
-from .sanity import Looked
+from .sanity import CheckedSimulator
 
 
 class Inputs(NamedTuple):
@@ -32,8 +33,9 @@ class Inputs(NamedTuple):
     - `sound`, `sound_holdout`: the same without samples that no actuator made; of long ones pieces.
     - `baseline`: a name, a sum of terms, a model, or a recording; `fixed`: its values stay.
     - `figures`: force errors in the caller's precision; `remarks`: about the recordings.
-    - `looked`: what was looked at before any physics where the baseline is a simulator, whose
-      `attributes` are those values that may be wrong.
+    - `checked`: what was checked before any physics where the baseline is a simulator, whose
+      `attributes` are those values that may be wrong; `arrived`: whether the force is what arrived
+      of a command.
     """
 
     recording: Recording
@@ -44,8 +46,22 @@ class Inputs(NamedTuple):
     fixed: bool
     figures: Figures
     remarks: list[Remark]
-    looked: Looked | None
+    checked: CheckedSimulator | None
     attributes: Mapping[str, Attribute]
+    arrived: bool = False
+
+    def cut_off(self, limit: Estimate) -> "Inputs":
+        """With what arrives of the command at a limit of the force, N."""
+        logs = (self.recording, self.holdout, self.sound, self.sound_holdout)
+        recording, holdout, sound, sound_holdout = (
+            None if log is None else sanity.arrived(log, limit) for log in logs
+        )
+        assert recording is not None and sound is not None
+        figures = Figures(recording, holdout, self.figures.x64)
+        return self._replace(
+            recording=recording, holdout=holdout, sound=sound, sound_holdout=sound_holdout,
+            figures=figures, arrived=True,
+        )  # fmt: skip
 
     def in_double_precision(self) -> tuple[Recording, Recording | None, Any]:
         """Recording, held-out recording and baseline as the search takes them."""
@@ -63,11 +79,11 @@ def prepare(
     _check(recording, baseline, holdout)
     recording, seldom = straight(recording)
     holdout = None if holdout is None else straight(holdout)[0]
-    baseline, looked = _simulator(recording, baseline, holdout), None
+    baseline, checked = _simulator(recording, baseline, holdout), None
     if isinstance(baseline, AbstractSimulator):
         doing("looking at signs, zeros, clocks and limits")
-        baseline = looked = sanity.looked_at(recording, baseline, holdout)
-        recording, holdout = looked.logs(recording, holdout)
+        baseline = checked = sanity.check_log(recording, baseline, holdout)
+        recording, holdout = checked.logs(recording, holdout)
     attributes = baseline.attributes() if isinstance(baseline, AbstractSimulator) else {}
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
     if isinstance(baseline, Earlier):
@@ -83,9 +99,9 @@ def prepare(
     baseline = shortened(baseline) if isinstance(baseline, Recording) else baseline
     more = [each._replace(text=f"On the held-out recording: {each.text}") for each in more]
     remarks = [*remarks, *more]
-    remarks = remarks if looked is None else looked.remarks(remarks)
+    remarks = remarks if checked is None else checked.remarks(remarks)
     return Inputs(
-        recording, holdout, sound, sound_holdout, baseline, fixed, figures, remarks, looked,
+        recording, holdout, sound, sound_holdout, baseline, fixed, figures, remarks, checked,
         attributes,
     )  # fmt: skip
 

@@ -164,6 +164,8 @@ def since_reversal(evidence: Evidence) -> tuple[np.ndarray, np.ndarray]:
 # Coordinates with the encoder's noise in them, differentiated twice or more, which is in the
 # residual too. Where most samples share a value, knots at its quantiles would resolve that noise.
 NOISY = frozenset({"acceleration", "predicted_force", "predicted_force_by_direction", "force_rate"})
+# Curves that can follow that noise: an inertia along the stroke is one over the position, too.
+ACCELERATED = NOISY | {"position_by_acceleration"}
 
 
 def _knots(name: str, values: np.ndarray) -> np.ndarray:

@@ -13,7 +13,9 @@ from .acceptance import LEAST_SHARE, LINEARITY
 from .baseline import as_given
 from .evidence import Evidence
 from .least_squares import RANK, orthonormal, solve
-from .regression import Fit
+from .predictions import with_predictions
+from .problem import PERSISTS
+from .regression import Fit, fit, freed
 from .significance import LEVEL, BlockBootstrap, blocks
 
 
@@ -22,7 +24,8 @@ class Mismatch(NamedTuple):
 
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
     `share`: part of the mean-square residual before that the right values remove; `p_value`;
-    `energy`: of the residual before, N²; `within`: numbers of those that move with the others, by
+    `energy`: of the residual before, N²; `rivals`: effects that take as much with no more numbers,
+    with none of these values wrong; `within`: numbers of those that move with the others, by
     no more than is uncertain; `instead`: to each that moved, what would do as well.
     """
 
@@ -32,6 +35,7 @@ class Mismatch(NamedTuple):
     energy: float
     within: frozenset[int] = frozenset()
     instead: dict[int, tuple[int, ...]] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
+    rivals: tuple[str, ...] = ()
 
 
 # More wrong values than this are another machine.
@@ -40,22 +44,20 @@ MOST_WRONG = 5
 SURE = 3.5
 
 
-def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> Mismatch | None:
+def mismatch(
+    model: Model, refitted: Fit, evidence: Evidence, wide: Evidence | None = None, seed: int = 0
+) -> Mismatch | None:
     """Which of a model's values are wrong on a recording; `None` if none is.
 
     `refitted`: with all values free, beside the terms found: values and missing physics are tested
     together. The refitted parameters differ from the given ones (all of them together at 1 %) and
     take enough of the residual. Of those the fewest are moved that leave no more than all of them
-    do, but for what no sensor of force resolves.
+    do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the width,
+    which have to show them too.
     """
-    given = as_given(model, refitted, evidence)
+    given, own, beside = _apart(model, refitted, evidence)
     share = 1 - refitted.energy / given.energy if given.energy > 0 else 0.0
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    count, counts = len(given.alphas[0]), len(given.betas[0])
-    affine, slopes = refitted.columns, refitted.slopes
-    own = np.concatenate([affine[:, :count], slopes[:, :counts]], axis=1)
-    beside = orthonormal(np.concatenate([affine[:, count:], slopes[:, counts:]], axis=1))
-    own = own - beside @ (beside.T @ own)
     raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
     empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
     scan = BlockBootstrap(empty, block, seed)(raw.astype(np.float32))
@@ -65,6 +67,8 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
     before = [*given.alphas[0], *given.betas[0]]
     enough = LINEARITY**2 * float(evidence.force @ evidence.force)
     free = fewest(own, given.residual, block, enough)
+    if free and wide is not None and len(free) <= MOST_WRONG:
+        free = _lasting(model, refitted, wide, free, solve(own[:, free], given.residual))
     if not free:
         return None
     free = _different(model, refitted, evidence, block, free)
@@ -74,6 +78,31 @@ def mismatch(model: Model, refitted: Fit, evidence: Evidence, seed: int = 0) -> 
         instead = _instead(own, given.residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
     return Mismatch(moved, float(share), p_value, given.energy, instead=instead)
+
+
+def _apart(model: Model, refitted: Fit, evidence: Evidence) -> tuple[Fit, np.ndarray, np.ndarray]:
+    """The fit at the values as given; its parameters' columns and derivatives apart from those of
+    all other terms, and an orthonormal basis of the latter.
+    """
+    given = as_given(model, refitted, evidence)
+    count, counts = len(given.alphas[0]), len(given.betas[0])
+    affine, slopes = refitted.columns, refitted.slopes
+    own = np.concatenate([affine[:, :count], slopes[:, :counts]], axis=1)
+    beside = orthonormal(np.concatenate([affine[:, count:], slopes[:, counts:]], axis=1))
+    return given, own - beside @ (beside.T @ own), beside
+
+
+def _lasting(
+    model: Model, refitted: Fit, wide: Evidence, free: list[int], shifts: np.ndarray
+) -> list[int]:
+    """The wrong values that rows through a kernel of twice the width show as well, and not much
+    smaller: the noise of the acceleration, which shifts an inertia, is much weaker there.
+    """
+    there = fit(refitted.terms, with_predictions(wide, refitted), refitted.betas, 0)
+    given, own, _ = _apart(model, there, wide)
+    again = solve(own[:, free], given.residual)
+    return [i for i, one, two in zip(free, shifts, again, strict=True)
+            if two * np.sign(one) >= PERSISTS * abs(one)]  # fmt: skip
 
 
 # What half of all parameters would do as well says nothing of any of them.
@@ -105,15 +134,6 @@ def _different(
             break
         free = [i for i in free if i != least]
     return free
-
-
-def freed(current: Fit, free: Iterable[int]) -> Fit:
-    """A fit of whose base only some values were fitted; what stayed has no error."""
-    moved, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
-    count, searched = len(current.alphas[0]), len(current.betas[0])
-    columns[:, [i for i in range(count) if i not in moved]] = 0.0
-    slopes[:, [i for i in range(searched) if count + i not in moved]] = 0.0
-    return current._replace(columns=columns, slopes=slopes)
 
 
 def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: float) -> list[int]:

@@ -11,10 +11,8 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
 from ..units import spell
-from .evidence import Evidence
 from .intervals import covariance
-from .predictions import with_predictions
-from .regression import Fit, fit
+from .regression import Fit
 
 
 def whole(current: Fit) -> AbstractTerm:
@@ -52,22 +50,29 @@ def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[di
     return result
 
 
-def refitted_to(evidence: Evidence, known: Fit, count: int, units) -> list[dict[str, Estimate]]:
-    """The parameters of a model refitted to other rows of the machine, in `count` blocks."""
-    again = fit(known.terms, with_predictions(evidence, known), known.betas, 4)
-    return estimates(again, np.arange(len(evidence.rows)) * count // len(evidence.rows), units)
+def may_be_none(
+    term: AbstractTerm, own: dict[str, Estimate], wide: dict[str, Estimate] | None = None
+) -> bool:
+    """Whether of all that its force is proportional to, of waves of the amplitudes too, there is no
+    interval that leaves out zero.
 
-
-def may_be_none(term: AbstractTerm, known: dict[str, Estimate]) -> bool:
-    """Whether the intervals of all that its force is proportional to hold zero; of waves, of the
-    amplitudes too.
+    `wide`: the same through a kernel of twice the width, which has to agree with it, as one that
+    sees little of it does, or to leave out zero on the same side.
     """
-    sizes = (
-        estimate.interval()
-        for name, estimate in known.items()
-        if name.startswith("amplitude") or any(name == p.name for p in term.affine)
-    )
-    return not any(low * high > 0 for low, high in sizes)
+
+    def sure(name: str) -> bool:
+        low, high = own[name].interval()
+        if low * high <= 0 or wide is None:
+            return bool(low * high > 0)
+        least, most = wide[name].interval()
+        apart = float(own[name].value) - float(wide[name].value)
+        return bool(
+            abs(apart) <= np.hypot(high - low, most - least) / 2
+            or (least > 0 if low > 0 else most < 0)
+        )
+
+    names = [name for name in own if name.startswith("amplitude")]
+    return not any(sure(name) for name in (*names, *(p.name for p in term.affine)))
 
 
 _wave = programs.compiled(wave)

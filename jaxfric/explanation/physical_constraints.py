@@ -1,17 +1,20 @@
 """Physical constraints: a load within the machine's inertia and friction, forces beyond zero."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ..identification.uncertainty import Estimate
 from ..terms.base import leaves
+from ..terms.effects import traits
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
 from . import parameters as spelled
 from .contest import Contest, Finalist
 from .evidence import Evidence
-from .regression import Fit, fit
-from .significance import blocks
+from .predictions import with_predictions
+from .regression import Fit, at_shapes, fit
+from .significance import blocks, evenly
 
 # Where the rows determine an inertia badly and prefer somewhat more than the machine has, a load
 # with all of it is tried; a hundredth less, not to be refused by rounding.
@@ -81,18 +84,25 @@ def physical(finalist: Finalist, current: Fit, evidence: Evidence) -> bool:
 def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
     """Numbers of the last `count` terms all of whose forces may as well be none, the last first.
 
-    The errors contain what a kernel of twice the width changes, `wide`.
+    At the shapes that they have, and through a kernel of twice the width too, `wide`. There is none
+    of an effect, either, whose distance or time may be zero.
     """
     start = len(current.terms) - count
     units = evidence.motion.unit_names
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    values = spelled.estimates(current, block, units)
+    free = spelled.estimates(current, block, units)
+    own = spelled.estimates(at_shapes(current), block, units)
+    there: Sequence[dict[str, Estimate] | None] = [None] * len(own)
     if wide is not None:
-        there = spelled.refitted_to(wide, current, int(block[-1]) + 1, units)
-        values = [spelled.with_smoothing(*pair) for pair in zip(values, there, strict=True)]
-    for number in reversed(range(count)):
-        if spelled.may_be_none(current.terms[start + number], values[start + number]):
-            yield number
+        rows = evenly(len(wide.rows), int(block[-1]) + 1)
+        again = fit(current.terms, with_predictions(wide, current), current.betas, 0)
+        there = spelled.estimates(at_shapes(again), rows, units)
+    for number in reversed(range(start, len(current.terms))):
+        term = current.terms[number]
+        gone = [free[number][name].interval() for name in traits(term).vanishes]
+        none = any(low <= 0 for low, _ in gone)
+        if none or spelled.may_be_none(term, own[number], there[number]):
+            yield number - start
 
 
 def _beside(

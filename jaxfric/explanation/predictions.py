@@ -5,7 +5,7 @@ import numpy as np
 from ..signals import kernel_slope
 from ..terms import KNOWN_FORCE
 from ..terms.effects import traits
-from .evaluation import PAIR, evaluate
+from .evaluation import evaluate, sizes
 from .evidence import Evidence
 from .nodes import NODES
 from .regression import Fit
@@ -24,7 +24,9 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if term.coordinates & PREDICTED:
             continue  # a fault acts on what the motion needs, not on itself
-        plain, moving = evaluate(term, np.repeat(beta[None], PAIR, axis=0), evidence.motion)
+        plain, moving = evaluate(
+            term, np.repeat(beta[None], sizes(term)[0], axis=0), evidence.motion
+        )
         force = force + alpha @ np.asarray(plain)[0]
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving)[0]

@@ -13,7 +13,7 @@ from .evidence import Evidence, gather
 from .motion import Motion, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
-from .reversals import yields
+from .reversals import creeps, yields
 from .significance import blocks
 
 # Alignments that differ by less than this part of a sample make no difference worth another search.
@@ -22,6 +22,9 @@ ALIGNED = 0.1
 
 # Width of a kernel between the narrow one and one of twice its width, in parts of the narrow one.
 BETWEEN = 4 / 3
+# Force that acts is as large through a kernel of twice the width. The noise of the acceleration is
+# 2⁵ to 2⁷ times weaker there in power; halfway between, on a scale of ratios, tells them apart.
+PERSISTS = 2**-1.25
 # Rows through that kernel and through the widest; `None` where too few would be left.
 WideKernels = tuple[Evidence | None, Evidence | None]
 
@@ -36,6 +39,7 @@ class Problem(NamedTuple):
       rows of the same motion.
     - `delay`: how much later the force was taken, s.
     - `in_slip`: where rows reach across reversals, the problem with rows in slip alone.
+    - `creeps`: whether these were left out since the axis creeps through zero velocity.
     - `held`: rows of the held-out recording, once everything has been chosen without it.
     """
 
@@ -48,6 +52,7 @@ class Problem(NamedTuple):
     candidate_sets: tuple[CandidateSet, ...]
     delay: float
     in_slip: "Problem | None" = None
+    creeps: bool = False
     held: Evidence | None = None
 
     @property
@@ -93,12 +98,14 @@ def problem_of(
     return problem
 
 
-def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem | None:
-    """The problem with rows across reversals too; `None` where the axis sticks there."""
+def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem:
+    """The problem with rows across reversals too; without them where the axis sticks or creeps."""
     motion, width, delay = motion_of(recording), problem.evidence.width, problem.delay
     if not yields(motion, problem.evidence, problem.base):
-        return None
+        return problem
     evidence = gather(motion, width, delay, True)
+    if creeps(evidence, fit([problem.structure], evidence, problem.base.betas)):
+        return problem._replace(creeps=True)
     wide = _wider(motion, evidence, delay, True)
     structure, base, candidate_sets = problem.structure, problem.base, problem.candidate_sets
     across = _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, True)

@@ -81,3 +81,10 @@ def turns(period: Estimate) -> str:
     if whole and abs(count - whole) <= max(half, 0.01 * whole):
         return f" ({'once' if whole == 1 else f'{whole} times'} per revolution)"
     return f" ({count:.3g} per revolution)"
+
+
+def rise(before: float, after: float) -> str:
+    """Two errors in words, "2.312% to 2.314%", with the digits that tell them apart, up to four."""
+    apart = (d for d in (2, 3) if round(100 * before, d) != round(100 * after, d))
+    digits = next(apart, 4)
+    return f"{before:.{digits}%} to {after:.{digits}%}"

@@ -6,12 +6,12 @@ principle as [`jaxfric.identification`][], for the many short-lived sums that ex
 nothing is compiled but each term once.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ..terms.base import AbstractTerm, summands
+from ..terms.base import AbstractTerm, changed_columns, summands
 from ..units import FORCE
 from .evidence import Evidence
 from .least_squares import bounded, orthonormal
@@ -150,6 +150,26 @@ def fit(
     return _refine(terms, rows, space, point, iterations)
 
 
+def freed(current: Fit, free: Iterable[int]) -> Fit:
+    """A fit of whose base only some values were fitted; what stayed has no error."""
+    moved, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
+    count, searched = len(current.alphas[0]), len(current.betas[0])
+    columns[:, [i for i in range(count) if i not in moved]] = 0.0
+    slopes[:, [i for i in range(searched) if count + i not in moved]] = 0.0
+    return current._replace(columns=columns, slopes=slopes)
+
+
+def at_shapes(current: Fit) -> Fit:
+    """A fit whose terms but the base have their shapes, β, given: the error of a size is its own.
+
+    A size that grows as its shape nears a limit, as of an exponential that nears a straight line,
+    may be anything together with it, though its force is sure.
+    """
+    slopes, base = current.slopes.copy(), len(current.betas[0])
+    slopes[:, base:] = 0.0
+    return current._replace(slopes=slopes)
+
+
 def without(current: Fit, evidence: Evidence, number: int) -> Fit:
     """A fit done again without one of its terms."""
     keep = [i for i in range(len(current.terms)) if i != number]
@@ -160,32 +180,46 @@ def _at(terms, evidence, space, point, derivatives=False) -> Fit:
     """The fit at given coordinates of β; with the derivatives by the coordinates' β."""
     betas = space.split(space.beta(point))
     step = 1e-4
+    shifted = space.split(space.beta(np.where(point + step > 1.0, point - step, point + step)))
     columns, moved = [], []
     for number, term in enumerate(terms):
-        grid, inner = [betas[number]], []
-        if derivatives:
-            offset = sum(space.counts[:number])
-            for i in range(space.counts[number]):
-                shifted = point.copy()
-                back = shifted[offset + i] + step > 1.0
-                shifted[offset + i] += -step if back else step
-                grid.append(space.split(space.beta(shifted))[number])
-                inner.append(grid[-1][i] - betas[number][i])
+        own, changed = betas[number], changed_columns(term)
+        groups = _apart(changed) if derivatives else []
+        grid = [own]
+        for group in groups:
+            grid.append(own.copy())
+            grid[-1][group] = shifted[number][group]
         rows = evidence.columns(term, np.stack(grid))
         columns.append(rows[0])
-        moved.append((rows[1:] - rows[:1], inner))
+        moved += [
+            (number, changed[i], (rows[1 + at] - rows[0])[:, changed[i]] / (grid[1 + at] - own)[i])
+            for i in range(len(own))
+            for at, group in enumerate(groups)
+            if i in group
+        ]
     whole = np.concatenate(columns, axis=1)
     alpha = bounded(whole, evidence.target, _forces_of_bumps(terms), evidence.peak)
     residual = evidence.target - whole @ alpha
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     alphas = tuple(alpha[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True))
-    slopes = [
-        (difference @ alphas[n]) / size
-        for n, (differences, sizes) in enumerate(moved)
-        for difference, size in zip(differences, sizes, strict=True)
-    ]
+    slopes = [change @ alphas[number][those] for number, those, change in moved]
     jacobian = np.stack(slopes, axis=1) if slopes else np.zeros((len(residual), 0))
     return Fit(terms, tuple(betas), alphas, whole, jacobian, residual, float(residual @ residual))
+
+
+def _apart(changed: Sequence[range]) -> list[list[int]]:
+    """Nonlinear parameters in groups that change no column in common: moved at once, each one's
+    part is seen by itself (Curtis, Powell & Reid 1974).
+    """
+    groups: list[list[int]] = []
+    for i, own in enumerate(changed):
+        for group in groups:
+            if not any(set(own) & set(changed[j]) for j in group):
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return groups
 
 
 def _scan(terms, evidence, space, point, unknown):

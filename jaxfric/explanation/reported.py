@@ -4,6 +4,7 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..terms.effect import Extent
+from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import verification
 from .baseline import Baseline
@@ -12,6 +13,7 @@ from .finding import Finding, Moved
 from .findings import Findings
 from .improvement import Improved
 from .mismatch import Mismatch
+from .quantities import rise
 from .regression import Fit
 from .selection import SelectedTerm
 from .sentences import changed_sentence, mismatch_sentence, sentence, spoken
@@ -68,11 +70,26 @@ def not_confirmed(better: Improved) -> list[Finding]:
     if not better.refuted:
         return []
     every, _ = reported(better.claimed, better.first)
-    text = " The held-out recording does not bear it out: it is not in the model."
     return [
-        every[n]._replace(confirmed=False, sentence=every[n].sentence + text)
+        every[n]._replace(
+            confirmed=False, sentence=f"{every[n].sentence}{_reason(every[n], better)}"
+        )
         for n in better.refuted
     ]
+
+
+def _reason(finding: Finding, better: Improved) -> str:
+    """Why a finding is not confirmed, the end of its sentence."""
+    if better.worse is None or not finding.confirmed:
+        return " The held-out recording does not bear it out: it is not in the model."
+    before, after = better.worse
+    name = "held" if "held" in after.worse(before, 0.0) else "filtered_held"
+    change = rise(getattr(before, name), getattr(after, name))
+    error = "force error" if name == "held" else "filtered force error"
+    return (
+        " The held-out recording shows it too, but the model with it is worse there: it takes the "
+        f"{error} from {change}. It is not in the model."
+    )
 
 
 def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> Finding:
@@ -89,12 +106,14 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
             )
     first = better.first
     held_share = None if held is None else verification.share(first, base, first, held)
-    text = mismatch_sentence(moved, wrong.share)
+    text = mismatch_sentence(moved, wrong.share, wrong.rivals)
     if known.fit is not None:
-        text = changed_sentence(moved, wrong.share, known.name.removeprefix("recording "))
+        other = known.name.removeprefix("recording ")
+        text = changed_sentence(moved, wrong.share, other, wrong.rivals)
+    separate_by = " ".join(dict.fromkeys(EFFECTS[rival].separate_by for rival in wrong.rivals))
     instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(
-        MISMATCH, PARAMETER_MISMATCH.equation, text, (), "", moved,
+        MISMATCH, PARAMETER_MISMATCH.equation, text, wrong.rivals, separate_by, moved,
         wrong.share, held_share, wrong.p_value, instead=instead,
     )  # fmt: skip
 

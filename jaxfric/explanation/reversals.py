@@ -3,19 +3,28 @@
 Under dry friction it rests from the stop to the break-away, whatever the force does in between,
 so that a row of the weak form across a reversal says nothing: its friction is the force itself.
 Under presliding it moves with that force, and then such a row is the best witness there is. The
-displacement decides, which needs neither a model of the encoder nor one of the controller.
+displacement decides, which needs neither a model of the encoder nor one of the controller. An axis
+may creep through zero, too, with a friction that is a steep function of the velocity, as most
+simulators have it: below the slowest speed that is told from rest nothing can be said of it.
 """
 
 from collections.abc import Iterator
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
+from ..terms import Dahl
+from ..terms.base import AbstractLaw
+from ..terms.sample import UNKNOWN, Parameter
+from ..units import FORCE, VELOCITY
 from .evidence import Evidence
 from .motion import Motion, motion_of
-from .regression import Fit
+from .predictions import with_predictions
+from .regression import Fit, fit
 from .significance import DRAWS
 
 # Part of the way from one break-away level to the other that counts, on both sides of the middle:
@@ -42,6 +51,36 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
         [_slope(level, position[at]) for at, level in passages(motion, evidence, base)]
     )
     return bool(len(slopes)) and _one_way(slopes)
+
+
+class _Creep(AbstractLaw):
+    """Friction that is steep about zero velocity instead of a jump: F = F_c (tanh(v/v_c) − sign v).
+
+    `creep_velocity` v_c, m/s, up to a third of the slowest slip: there it is Coulomb friction but
+    for half a percent (tanh 3). Below a thousandth of the slowest slip it is a jump.
+    """
+
+    creep_velocity: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("creep_force", FORCE),)
+    nonlinear: ClassVar = (
+        Parameter("creep_velocity", VELOCITY, lambda s: (1e-3 * s.slowest, s.slowest / 3)),
+    )
+
+    def law(self, sample):
+        velocity = sample.velocity
+        return (jnp.tanh(velocity / self.creep_velocity) - jnp.sign(velocity),)
+
+
+def creeps(evidence: Evidence, base: Fit) -> bool:
+    """Whether rows across reversals show no more than a creep below the slowest slip.
+
+    It takes more of what the base leaves there than friction that builds up over a distance does.
+    """
+    seen = with_predictions(evidence, base)
+    crept, elastic = (
+        fit((*base.terms, law), seen, (*base.betas, None), 6).energy for law in (_Creep(), Dahl())
+    )
+    return crept < elastic
 
 
 def _one_way(slopes: np.ndarray) -> bool:

@@ -1,5 +1,7 @@
 """The search for missing physics: in slip, then across reversals; with a late force put back."""
 
+from collections.abc import Hashable
+
 from ..models import Model
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
@@ -13,14 +15,19 @@ from .selection import Selection
 from .stepwise import select
 from .timing import late, overlooked, with_late_force
 
+# Forms of laws that do not compete.
+Refused = frozenset[Hashable]
 
-def searched(motion: Motion, problem: Problem, seed: int) -> Findings:
-    """The findings on a recording.
+
+def searched(
+    motion: Motion, problem: Problem, seed: int, refused: Refused = frozenset()
+) -> Findings:
+    """The findings on a recording; laws of the forms in `refused` do not compete.
 
     To first order a delay is a column; what it leaves of second order would be selected too. So
     where the force acts late it is put back, and the search is done once more.
     """
-    found = aligned(motion, problem, seed)
+    found = aligned(motion, problem, seed, refused)
     lateness = None
     if any(traits(term).late for term in found.selection.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
@@ -31,7 +38,8 @@ def searched(motion: Motion, problem: Problem, seed: int) -> Findings:
     if lateness is None:
         return alone(found)
     undone, structure = lateness.undone(motion), found.problem.structure
-    undelayed = aligned(undone, problem_of(undone, structure, before=found.problem), seed)
+    again = problem_of(undone, structure, before=found.problem)
+    undelayed = aligned(undone, again, seed, refused)
     findings = with_late_force(found, undelayed, lateness)
     after, before = (
         verification.error(each.selection.last, each.problem.evidence)
@@ -53,28 +61,30 @@ def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
     return aligned(motion, problem_of(motion, structure), seed)
 
 
-def aligned(motion: Motion, problem: Problem, seed: int) -> Solution:
+def aligned(
+    motion: Motion, problem: Problem, seed: int, refused: Refused = frozenset()
+) -> Solution:
     """The terms selected; once more if they change how force and motion are aligned."""
-    found = _selected(motion, problem, seed)
+    found = _selected(motion, problem, seed, refused)
     if found.selection.selected:
         again = problem_of(motion, problem.structure, found.selection.last, found.problem)
         interval = found.problem.evidence.limits.interval
         if abs(again.delay - found.problem.delay) > ALIGNED * interval:
-            return _selected(motion, again, seed)
+            return _selected(motion, again, seed, refused)
     return found
 
 
-def _selected(motion: Motion, problem: Problem, seed: int) -> Solution:
+def _selected(motion: Motion, problem: Problem, seed: int, refused: Refused) -> Solution:
     """What rows in slip show, and then, where the axis yields there, rows across reversals.
 
     What acts at reversals is ten times as large in those, and no term has quite its shape: the
     remainder would hide all else.
     """
-    in_slip = select(problem, seed)
+    in_slip = select(problem, seed, refused=refused)
     across = across_reversals(motion, problem)
-    if across is None:
-        return Solution(problem, in_slip)
-    return Solution(across, select(across, seed, in_slip))
+    if not across.reversals:
+        return Solution(across, in_slip)
+    return Solution(across, select(across, seed, in_slip, refused))
 
 
 def at_given(model: Model, findings: Findings, free: tuple[int, ...]) -> Findings:

@@ -1,6 +1,6 @@
 """What a search selects: terms on top of the base, with what each could be instead."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
 from ..data.recording import Recording
@@ -31,6 +31,11 @@ class SelectedTerm(NamedTuple):
         """The effect of the term."""
         return self.trial.effect
 
+    @property
+    def form(self) -> Hashable:
+        """The form of its law."""
+        return self.trial.candidate.form
+
 
 class Selection(NamedTuple):
     """The terms that the residual calls for, on top of the base.
@@ -40,6 +45,7 @@ class Selection(NamedTuple):
     - `in_slip`: what rows in slip had shown, where rows reach across reversals.
     - `given`: the base with its own values, where these stay but for `free`, numbers of its
       parameters.
+    - `trusted`: whether these values are taken as exact, since a term stands in for wrong ones.
     - `undone`: puts back the force of a recording, where it acts late; `time_error`: of that time,
       by smoothing and sampling, s.
     """
@@ -52,12 +58,18 @@ class Selection(NamedTuple):
     in_slip: "Selection | None" = None
     given: Model | None = None
     free: tuple[int, ...] = ()
+    trusted: bool = False
     undone: Callable[[Recording], Motion] | None = None
 
     @property
     def names(self) -> frozenset[str]:
         """The effects that were found."""
         return frozenset(each.effect.name for each in self.selected)
+
+    @property
+    def forms(self) -> frozenset[Hashable]:
+        """The forms of the laws that were found."""
+        return frozenset(each.form for each in self.selected)
 
     def term_index(self, number: int) -> int:
         """The index, among all terms of the fit, of the selected term of that number."""

@@ -2,10 +2,12 @@
 
 import math
 import re
+from collections.abc import Sequence
 
 from ..identification.uncertainty import Estimate
 from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
+from ..terms.effects.parameter_mismatch import MISMATCH
 from .quantities import nil, quantity, turns
 
 NOWHERE = Extent()
@@ -28,12 +30,15 @@ def sentence(
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     text = re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
-    text += f"; {share:.0%} of the unexplained force"
-    if rivals:
-        text += ". This recording cannot tell it from " + " or ".join(
-            rival.replace("_", " ") for rival in rivals
-        )
-    return text + "."
+    return f"{text}; {share:.0%} of the unexplained force{indistinct(rivals)}."
+
+
+def indistinct(rivals: Sequence[str]) -> str:
+    """What a finding may be as well, the end of its sentence."""
+    names = " or ".join(
+        "wrong values" if rival == MISMATCH else rival.replace("_", " ") for rival in rivals
+    )
+    return f". This recording cannot tell it from {names}" if rivals else ""
 
 
 def _words(effect: Effect, name: str, estimate: Estimate) -> str:
@@ -46,7 +51,7 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     return quantity(estimate)
 
 
-def mismatch_sentence(moved, share: float) -> str:
+def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
     """Wrong values of the baseline as a sentence."""
     parts = []
     for name, m in moved.items():
@@ -58,7 +63,8 @@ def mismatch_sentence(moved, share: float) -> str:
         else:
             value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    return f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force."
+    text = f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force"
+    return f"{text}{indistinct(rivals)}."
 
 
 # How much of a simulator's force is recorded beyond all of it.
@@ -98,7 +104,7 @@ def parameter(name: str) -> str:
     return _SPOKEN.get(stem, stem.replace("_", " ")) + _SIDES[side]
 
 
-def changed_sentence(moved, share: float, other: str) -> str:
+def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()) -> str:
     """Values that another recording had otherwise, as a sentence; ± of the change, 95 %."""
     parts = []
     for name, m in moved.items():
@@ -113,7 +119,8 @@ def changed_sentence(moved, share: float, other: str) -> str:
         parts.append(part)
     text = ", ".join(parts)
     text = text[:1].upper() + text[1:]
-    return f"{text} since {other or 'the other recording'}; {share:.0%} of the difference."
+    text = f"{text} since {other or 'the other recording'}; {share:.0%} of the difference"
+    return f"{text}{indistinct(rivals)}."
 
 
 def _spoken(name: str) -> str:

@@ -165,7 +165,12 @@ def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
             f"{len(elapsed) * spacing:.3g} s of slip are too short to tell structure from chance; "
             f"with this noise that takes {needed:.3g} s. Record longer, or more finely."
         )
-    return np.arange(len(elapsed)) * count // len(elapsed)
+    return evenly(len(elapsed), count)
+
+
+def evenly(rows: int, count: int) -> np.ndarray:
+    """The block of each row, for so many blocks with as many rows each, `(rows,)`."""
+    return np.arange(rows) * count // rows
 
 
 def agreement(changes: np.ndarray, block: np.ndarray, seed: int) -> float:

@@ -3,10 +3,7 @@
 import copy
 from collections.abc import Hashable
 
-import jax
-
 from .acceptance import LEAST_SHARE, accepted
-from .candidates import Candidate
 from .contest import Finalist, Trial, contest
 from .evidence import Evidence
 from .intervals import left_out
@@ -22,21 +19,27 @@ from .significance import blocks
 MOST_TERMS = 4
 
 
-def select(problem: Problem, seed: int = 0, in_slip: Selection | None = None) -> Selection:
+def select(
+    problem: Problem,
+    seed: int = 0,
+    in_slip: Selection | None = None,
+    refused: frozenset[Hashable] = frozenset(),
+) -> Selection:
     """Add terms while they are accepted; after each, drop those that have become idle.
 
+    `refused`: forms of laws that do not compete.
     `in_slip`: what the rows in slip have shown, where those of the problem reach across reversals.
     Then only effects that act at reversals compete: all others have, where nothing hides them.
     """
     current, selected = _started(problem, in_slip)
     evidence, known = with_predictions(problem.evidence, current), len(selected)
-    refused, visited = set[Hashable](), set[Hashable]()
+    visited = set[Hashable]()
     while True:
         round_ = contest(
             evidence, current, problem.candidate_set, seed,
             lambda effect: in_slip is None or effect.at_reversals,
         )  # fmt: skip
-        allowed = [f for f in round_.finalists if _form(f.trial.candidate) not in refused]
+        allowed = [f for f in round_.finalists if f.trial.candidate.form not in refused]
         round_ = constrained(round_._replace(finalists=allowed), current, evidence)
         best = accepted(round_, current, evidence, problem.wide_kernels, problem.base, selected)
         # Two terms that make each other idle would take turns for ever.
@@ -45,12 +48,12 @@ def select(problem: Problem, seed: int = 0, in_slip: Selection | None = None) ->
             break
         visited.add(names)
         best, rivals, instead = with_rivals(simplest(best, round_), round_, current, evidence)
-        current, evidence = _joined(best, current, evidence)
-        trial = _with_own_term(best.trial, current)
+        current, evidence = joined(best, current, evidence)
+        trial = with_own_term(best.trial, current)
         selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
         current, selected = _pruned(evidence, current, selected, round_.size)
         for number in nil(current, len(selected), evidence, problem.wide):
-            refused.add(_form(selected[number].trial.candidate))
+            refused |= {selected[number].form}
             current = without(current, evidence, len(current.terms) - len(selected) + number)
             selected = [each for i, each in enumerate(selected) if i != number]
     if in_slip is not None and len(selected) == known and selected:
@@ -74,7 +77,7 @@ def _started(problem: Problem, in_slip: Selection | None) -> tuple[Fit, list[Sel
     return fit(current.terms, evidence, current.betas, 0), selected
 
 
-def _joined(best: Finalist, current: Fit, evidence: Evidence) -> tuple[Fit, Evidence]:
+def joined(best: Finalist, current: Fit, evidence: Evidence) -> tuple[Fit, Evidence]:
     """The model with a term of its own for the winner: two waves of one candidate are two terms."""
     terms = (*current.terms, copy.copy(best.trial.candidate.term))
     current = fit(terms, evidence, best.betas)
@@ -82,14 +85,9 @@ def _joined(best: Finalist, current: Fit, evidence: Evidence) -> tuple[Fit, Evid
     return fit(terms, evidence, current.betas, 4), evidence
 
 
-def _with_own_term(trial: Trial, current: Fit) -> Trial:
+def with_own_term(trial: Trial, current: Fit) -> Trial:
     """The trial with the term as the model holds it, its last."""
     return trial._replace(candidate=trial.candidate._replace(term=current.terms[-1]))
-
-
-def _form(candidate: Candidate) -> Hashable:
-    """The form of its law."""
-    return jax.tree.structure(candidate.term)
 
 
 def elsewhere(selection: Selection) -> tuple[Fit, list[SelectedTerm]]:

@@ -11,10 +11,10 @@ from .bins import unit
 from .evidence import Evidence
 from .finding import Finding
 from .improvement import Improved
-from .locate import NOISY, Structure, locate, repeated
+from .locate import ACCELERATED, Structure, locate, repeated
 from .mismatch import Mismatch
 from .predictions import with_predictions
-from .problem import Problem
+from .problem import PERSISTS, Problem
 from .regression import Fit, fast, fit
 from .significance import LEVEL
 
@@ -51,25 +51,23 @@ def significant(found: list[Structure], least: float, force: float) -> list[Stru
 def through_wide(
     found: list[Structure], current: Fit, wide: Evidence | None, seed: int
 ) -> list[Structure]:
-    """Without structure over noisy coordinates that a kernel of twice the width does not show.
+    """Without structure that a kernel of twice the width does not show, or shows much smaller.
 
-    These coordinates hold the acceleration, whose noise is in the residual too, by the loop's
-    answer to the encoder: a curve that follows that noise alone is 2⁵ to 2⁷ times weaker there in
-    power. Not tested is a curve larger than all that differs from row to row; but one over the
-    force's rate, which holds the acceleration's derivative, always is.
+    Tested are curves that hold the acceleration, whose noise is in the residual too: by the loop's
+    answer to the encoder, and in the torque of another simulator, which is its inertia times the
+    recorded acceleration.
     """
-    noise = fast(current)
-
-    def doubtful(each: Structure) -> bool:
-        rate = each.coordinate == "force_rate"
-        return rate or (each.coordinate in NOISY and each.size <= noise)
-
-    if wide is None or not any(map(doubtful, found)):
+    if wide is None or not any(s.coordinate in ACCELERATED for s in found):
         return found
     again = fit(current.terms, with_predictions(wide, current), current.betas, 4)
-    there = locate(with_predictions(wide, again), again, seed)
-    sure = {s.coordinate for s in there if s.p_value <= LEVEL and s.share >= LEAST_SHARE}
-    return [s for s in found if s.coordinate in sure or not doubtful(s)]
+    located = locate(with_predictions(wide, again), again, seed)
+    there = {s.coordinate: s for s in located if s.p_value <= LEVEL and s.share >= LEAST_SHARE}
+
+    def lasts(each: Structure) -> bool:
+        same = there.get(each.coordinate)
+        return same is not None and same.size >= PERSISTS * each.size
+
+    return [s for s in found if s.coordinate not in ACCELERATED or lasts(s)]
 
 
 def lasting(found: list[Structure], current: Fit, problem: Problem) -> list[Structure]:

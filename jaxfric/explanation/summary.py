@@ -12,13 +12,13 @@ from ..terms.effects import EFFECTS
 from . import parameters as spelled, structure, verification
 from .baseline import Baseline
 from .curves import curves
-from .doubts import accelerates, doubts, not_better
+from .doubts import accelerates, creeping, doubts, not_better
 from .errors import document, filtered_errors
 from .explained import Explanation
 from .figures import Figures
 from .finding import Finding
 from .improvement import Improved, holdout_model
-from .mismatch import Mismatch, freed
+from .mismatch import Mismatch
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
@@ -100,9 +100,10 @@ def _by_effect(findings: Sequence[Finding]) -> dict[str, float]:
 
 def _values(better: Improved, wrong: Mismatch | None, units) -> dict[str, Estimate]:
     """The baseline's parameters in the model that is reported."""
-    last = _selection(better).last
-    last = last if wrong is None else freed(last, wrong.moved)
-    return spelled.estimates(last, better.findings.problem.block, units)[0]
+    if wrong is not None:
+        return estimated(better.findings, wrong.moved)[0]
+    problem, selection = better.findings.recorded
+    return spelled.estimates(selection.last, problem.block, units)[0]
 
 
 def _doubts(better: Improved) -> list[Remark]:
@@ -113,6 +114,8 @@ def _doubts(better: Improved) -> list[Remark]:
     if accelerates(values):  # with what other rows say of it
         values = estimated(better.findings)[0]
     remarks = doubts(selection.last, problem, values, better.after.filtered)
+    if problem.creeps:
+        remarks.append(creeping(problem))
     if better.spoilt is not None:
         remark = not_better(better.dropped, better.before, better.spoilt)
         late = any(EFFECTS[name].late for name in better.dropped)

@@ -50,8 +50,8 @@ def summary(
 def _not_confirmed(findings: Sequence[Finding]) -> str:
     names = dict.fromkeys(finding.effect.replace("_", " ") for finding in findings)
     return (
-        f"What looks like {' and '.join(names)} here is not borne out by the held-out recording, "
-        "and is left out of the model."
+        f"What looks like {' and '.join(names)} here does not make the model better on the "
+        "held-out recording, and is left out of the model."
     )
 
 

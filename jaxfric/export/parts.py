@@ -279,4 +279,8 @@ def burst(model: Model, part: Part) -> float:
 
 def unwritten(model: Model, target: str = "c") -> tuple[str, ...]:
     """What C, Structured Text and an FMU leave out of a model, or Modelica, a line each."""
-    return tuple(left_out(model, part) for part in divided(model, target == "modelica").left)
+    lines = [left_out(model, part) for part in divided(model, target == "modelica").left]
+    if model.force_limit is not None:
+        most = f"{float(model.force_limit):.5g} {dict(model.units)['force']}"
+        lines.append(f"force limit: no more than {most} arrives; hold commands within it")
+    return tuple(lines)

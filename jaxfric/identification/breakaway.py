@@ -19,7 +19,7 @@ from ..data.excerpt import excerpt
 from ..data.recording import Recording, require
 from ..looks import text
 from ..models import Model
-from ..signals import polynomial
+from ..signals import counted_noise
 from ..units import FORCE, spell
 from .constant_velocity import beyond, slowest_slip
 from .curves import band
@@ -124,7 +124,7 @@ def breakaway(recording: Recording, found: Any) -> BreakAway:
         reach = signals.choose(recording).half_width
     log = jax.tree.map(np.asarray, signals.prepare(recording))
     force = np.asarray(log.force, float) - beyond(found, log)
-    noise = DEVIATIONS * polynomial.white_noise(force) / np.sqrt(2 * NEAR + 1)
+    noise = DEVIATIONS * counted_noise(force) / np.sqrt(2 * NEAR + 1)
     smooth = np.convolve(np.pad(force, NEAR, "edge"), np.full(2 * NEAR + 1, 1 / (2 * NEAR + 1)))
     smooth = smooth[2 * NEAR : -2 * NEAR]
     seen = list(_departures(log, slowest_slip(log), reach))

@@ -20,7 +20,7 @@ from ..data.excerpt import excerpt
 from ..data.recording import Recording, require
 from ..looks import text
 from ..models import Model
-from ..signals import polynomial
+from ..signals import counted_noise
 from ..units import VELOCITY, spell
 from .curves import band
 from .stretches import BAND, Stretch, steady, unsteady
@@ -144,7 +144,7 @@ def slowest_slip(log: Recording) -> float:
     if velocity.size < 2:
         return 0.0
     fastest = float(np.quantile(np.abs(velocity), 0.98))
-    noise = polynomial.white_noise(velocity)
+    noise = counted_noise(velocity)
     return max(signals.SLIP_DEVIATIONS * noise, signals.SLIP_SHARE * fastest)
 
 

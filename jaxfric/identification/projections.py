@@ -21,6 +21,8 @@ from ..terms.sample import Scales
 # Levels of velocity tried for the ends of a window, between the first and the last velocity of a
 # segment: outside that range windows only get shorter.
 WINDOW_LEVELS = 17
+# Offsets of a kernel whose shares are added in one pass over the rows: a third of the time.
+UNROLLED = 8
 
 
 class Rows(eqx.Module):
@@ -53,6 +55,10 @@ class Rows(eqx.Module):
     ) -> Float[Array, "J p"]:
         """Columns as rows of the regression, shape `(J, p)`; `momentum` enters differentiated."""
         return columns if self._filter is None else self._filter.apply(columns, momentum)
+
+    def rate(self, momentum: Float[Array, " N"]) -> Float[Array, " J"]:
+        """The time derivative of one momentum as rows of the weak form, `(J,)`."""
+        return self._filter.rate(momentum[:, None])[:, 0]
 
     def thinned(self, recording: Recording, step: int) -> tuple["Rows", Recording]:
         """The same rows from one of so many samples, and these samples: for a first look.
@@ -122,45 +128,56 @@ def _windows(recording: Recording, scales: Scales) -> tuple[Float[Array, " N"], 
     count = recording.num_segments or 1
     segment = recording.segment
 
-    def over(reduce, per_segment, values, fill):
-        if count == 1:
-            return jnp.broadcast_to(reduce(values), (1,))
-        return per_segment(jnp.where(jnp.isfinite(values), values, fill), segment, count)
+    size = time.shape[0]
 
-    def first(values):
-        return over(jnp.min, jax.ops.segment_min, values, jnp.inf)
+    def over(reduce, per_segment, values):
+        return reduce(values)[None] if count == 1 else per_segment(values, segment, count)
 
-    def last(values):
-        return over(jnp.max, jax.ops.segment_max, values, -jnp.inf)
+    def first(where):
+        """The first sample of each segment for which it holds; `size` where it does for none."""
+        return over(jnp.min, jax.ops.segment_min, jnp.where(where, jnp.arange(size), size))
+
+    def last(where):
+        """The last one; -1 or less where there is none."""
+        return over(jnp.max, jax.ops.segment_max, jnp.where(where, jnp.arange(size), -1))
+
+    def everywhere(values):
+        """A number of each segment at its samples."""
+        return values if count == 1 else values[segment]
 
     valid = recording.mask
-    begins = first(jnp.where(valid, time, jnp.inf))[segment] == time
-    ends = last(jnp.where(valid, time, -jnp.inf))[segment] == time
-    v_first = -first(jnp.where(begins & valid, -velocity, jnp.inf))
-    v_last = -first(jnp.where(ends & valid, -velocity, jnp.inf))
+    v_first = velocity[jnp.minimum(first(valid), size - 1)]
+    v_last = velocity[jnp.maximum(last(valid), 0)]
 
-    size = jnp.max(jnp.where(valid & jnp.isfinite(velocity), jnp.abs(velocity), 0.0))
-    rounding = 64 * jnp.finfo(velocity.dtype).eps * size
+    fastest = jnp.max(jnp.where(valid & jnp.isfinite(velocity), jnp.abs(velocity), 0.0))
+    rounding = 64 * jnp.finfo(velocity.dtype).eps * fastest
 
     def longest(best, share):
-        level = (v_first + share * (v_last - v_first))[segment]
-        above = velocity - level
-        # A record that ends at the velocity at which it began does so to rounding.
-        above = jnp.where(jnp.abs(above) <= rounding, 0.0, above)
-        crosses = together & (above[1:] * above[:-1] <= 0)
-        rise = jnp.where(above[1:] == above[:-1], 1.0, above[1:] - above[:-1])
-        share_before = jnp.clip(-above[:-1] / rise, 0.0, 1.0)
-        at = time[:-1] + share_before * jnp.diff(time)
-        early = jnp.concatenate([jnp.where(crosses, at, jnp.inf), jnp.full(1, jnp.inf)])
-        late = jnp.concatenate([jnp.where(crosses, at, -jnp.inf), jnp.full(1, -jnp.inf)])
-        begin, end = first(early), last(late)
-        better = end - begin > best[1] - best[0]
+        level = v_first + share * (v_last - v_first)
+
+        def above(velocity, level):
+            # A record that ends at the velocity at which it began does so to rounding.
+            over = velocity - level
+            return jnp.where(jnp.abs(over) <= rounding, 0.0, over)
+
+        def crossed(at):
+            """When the velocity's line from that sample to the next is at the level, s."""
+            at = jnp.clip(at, 0, size - 2)
+            before, after = (above(velocity[i], level) for i in (at, at + 1))
+            rise = jnp.where(after == before, 1.0, after - before)
+            return time[at] + jnp.clip(-before / rise, 0.0, 1.0) * (time[at + 1] - time[at])
+
+        height = above(velocity, everywhere(level))
+        crosses = jnp.pad(together & (height[1:] * height[:-1] <= 0), (0, 1))
+        early, late = first(crosses), last(crosses)
+        begin, end = crossed(early), crossed(late)
+        better = (late >= 0) & (end - begin > best[1] - best[0])
         return (jnp.where(better, begin, best[0]), jnp.where(better, end, best[1])), None
 
     empty = (jnp.zeros(count, time.dtype), jnp.zeros(count, time.dtype))
     shares = jnp.linspace(0.0, 1.0, WINDOW_LEVELS, dtype=time.dtype)
     (begin, end), _ = jax.lax.scan(longest, empty, shares)
-    return begin[segment], end[segment]
+    return tuple(jnp.broadcast_to(everywhere(x), time.shape) for x in (begin, end))
 
 
 def _slip_time(recording: Recording, scales: Scales, begin, end):
@@ -225,17 +242,23 @@ class Filter(eqx.Module):
 
         ∫ φ ḣ dt = −∫ φ̇ h dt: the derivative is taken on the kernel.
         """
+        averaged = self._weighed(self.average, columns)
+        return averaged if momentum is None else averaged + self.rate(momentum)
+
+    def rate(self, momentum: Float[Array, "N p"]) -> Float[Array, "J p"]:
+        """The time derivative of momentum, `(J, p)`."""
+        return self._weighed(self.slope, momentum)
+
+    def _weighed(self, weights: Float[Array, "K J"], values: Float[Array, "N p"]):
+        """Sums of the values around each centre, weighted, `(J, p)`."""
 
         def add(total, step):
-            offset, average, slope = step
-            total = total + average[:, None] * self.gather(columns, offset)
-            if momentum is not None:
-                total = total + slope[:, None] * self.gather(momentum, offset)
-            return total, None
+            offset, weight = step
+            return total + weight[:, None] * self.gather(values, offset), None
 
         offsets = jnp.arange(-self.reach, self.reach + 1)
-        empty = jnp.zeros((self.average.shape[1], columns.shape[1]), columns.dtype)
-        return jax.lax.scan(add, empty, (offsets, self.average, self.slope))[0]
+        empty = jnp.zeros((weights.shape[1], values.shape[1]), values.dtype)
+        return jax.lax.scan(add, empty, (offsets, weights), unroll=UNROLLED)[0]
 
 
 def _gather(values, offset, reach, stride):
@@ -261,16 +284,17 @@ def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int
     duration = 0.5 * (jnp.pad(steps, (0, 1)) + jnp.pad(steps, (1, 0)))
     centre = _gather(recording.time, 0, half_width, stride)
 
-    def weigh(offset):
+    def weigh(rise, offset):
         since = _gather(recording.time, offset, half_width, stride) - centre
         lasts = _gather(duration, offset, half_width, stride)
         tau = since / (half_width * typical)
         slope = kernel_slope(tau) * lasts
-        return kernel(tau) * lasts, slope, slope * since
+        return rise + slope * since, (kernel(tau) * lasts, slope)
 
     # One offset after the other: together the slices were a gather of every sample.
-    average, slope, rise = jax.lax.map(weigh, jnp.arange(-half_width, half_width + 1))
-    average, slope = kernel_weights(average, slope, jnp.sum(rise, axis=0))
+    offsets = jnp.arange(-half_width, half_width + 1)
+    rise, (average, slope) = jax.lax.scan(weigh, jnp.zeros_like(centre), offsets)
+    average, slope = kernel_weights(average, slope, rise)
     return Filter(average, slope, half_width, stride)
 
 

@@ -54,7 +54,7 @@ def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     A column that the ones before it already span becomes zero, and so do its derivatives: a
     Householder QR would return an arbitrary direction and NaN derivatives there.
     """
-    return _basis(columns).orthonormal()
+    return basis_of(columns).orthonormal()
 
 
 def gram_schmidt(columns: Float[Array, "J p"]) -> tuple[Float[Array, "J p"], Float[Array, "p p"]]:
@@ -82,7 +82,7 @@ def gram_schmidt(columns: Float[Array, "J p"]) -> tuple[Float[Array, "J p"], Flo
     return jax.lax.scan(append, empty, (columns.T, places))[0]
 
 
-class _Basis(eqx.Module):
+class Basis(eqx.Module):
     """An orthonormal basis Q = A M of columns A, as A `first` = `near` and Q = `near` `white`."""
 
     near: Float[Array, "J p"]
@@ -103,7 +103,7 @@ class _Basis(eqx.Module):
         return matrix @ (matrix.T @ vector)
 
 
-def _basis(columns) -> _Basis:
+def basis_of(columns: Float[Array, "J p"]) -> Basis:
     """The basis of [`gram_schmidt`][], of tall columns in a quicker way where that is as exact.
 
     Gram-Schmidt on some of the rows makes the columns nearly orthonormal on all of them, and what
@@ -114,11 +114,11 @@ def _basis(columns) -> _Basis:
         square = jnp.sum(columns**2)
         there = square > 0
         scale = jnp.where(there, 1 / jnp.sqrt(jnp.where(there, square, 1.0)), 0.0)
-        return _Basis(columns, jnp.ones((1, 1), columns.dtype), scale[None, None])
+        return Basis(columns, jnp.ones((1, 1), columns.dtype), scale[None, None])
 
     def slow():
         basis, matrix = gram_schmidt(columns)
-        return _Basis(basis, matrix, jnp.eye(columns.shape[1], dtype=columns.dtype))
+        return Basis(basis, matrix, jnp.eye(columns.shape[1], dtype=columns.dtype))
 
     if columns.shape[0] < TALL:
         return slow()
@@ -128,7 +128,7 @@ def _basis(columns) -> _Basis:
     first = first + jnp.diag(jnp.where(jnp.diagonal(first) > 0, 0.0, 1.0).astype(first.dtype))
     near = columns @ first
     white, pivot = small.whiten(near.T @ near)
-    return jax.lax.cond(pivot > NEAR, lambda: _Basis(near, first, white), slow)
+    return jax.lax.cond(pivot > NEAR, lambda: Basis(near, first, white), slow)
 
 
 def project_out(basis: Float[Array, "J q"], values: Float[Array, "J k"]) -> Float[Array, "J k"]:
@@ -167,7 +167,7 @@ def least_squares(
     `known`: the coefficients themselves, where they come from a shorter way and only their
     derivative is asked for.
     """
-    return _basis(columns).solve(target) if known is None else known
+    return basis_of(columns).solve(target) if known is None else known
 
 
 @least_squares.defjvp
@@ -175,7 +175,7 @@ def _(primals, tangents):
     """By the normal equations Aᵀ(t − Aα) = 0: the steps of the solution are not differentiated."""
     columns, target, known = primals
     turned, moved, _ = tangents
-    basis = _basis(columns)
+    basis = basis_of(columns)
     alpha = basis.solve(target) if known is None else least_squares(*primals)
     rest = target - columns @ alpha
     return alpha, basis.solve(moved - turned @ alpha) + basis.divide(turned.T @ rest)

@@ -54,11 +54,14 @@ def invert_upper(matrix: Float[Array, "p p"]) -> Float[Array, "p p"]:
     return jax.lax.scan(add, jnp.zeros_like(matrix), (matrix, places), reverse=True)[0]
 
 
-def whiten(gram: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, ""]]:
+def whiten(
+    gram: Float[Array, "p p"], spanned: float = 0.0
+) -> tuple[Float[Array, "p p"], Float[Array, ""]]:
     """Upper triangular W with Wᵀ G W = 1, and the least pivot of G scaled to a unit diagonal.
 
     Gram-Schmidt on the unit vectors with the inner product G. A row and column of zeros stays zero
-    in W and has no pivot; where the pivot is not well above rounding, W means nothing.
+    in W and has no pivot; where the pivot is not well above rounding, W means nothing. A column
+    with a pivot of `spanned` or less counts as spanned by those before it, and stays zero too.
     """
     diagonal = jnp.diagonal(gram)
     there = diagonal > 0
@@ -69,7 +72,7 @@ def whiten(gram: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array,
         white, least = state
         rest = place - white @ (white.T @ (gram @ place))
         pivot = jnp.vdot(rest, gram @ rest)
-        valid = pivot > 0
+        valid = pivot > spanned
         unit = rest / jnp.sqrt(jnp.where(valid, pivot, 1.0))
         least = jnp.where(jnp.vdot(place, scale) > 0, jnp.minimum(least, pivot), least)
         return (white + jnp.where(valid, unit, 0.0)[:, None] * place[None, :], least), None

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from . import reduced, uncertainty
+from . import reduced, small, uncertainty
 from .projections import Rows
 from .uncertainty import Deviations
 
@@ -53,30 +53,32 @@ def weigh(
     where each sample stands in the slip time; `weak`, rows of the weak form.
     """
     friction = offset + jacobian[:, : alpha.size] @ alpha
-    velocity = recording.velocity
-    still = jnp.zeros_like(velocity)
-    values = jnp.concatenate([jnp.stack([still, friction, place], 1), jacobian], axis=1)
-    momentum = jnp.zeros_like(values).at[:, 0].set(velocity)
-    rows = weak.project(values, momentum)
-    push, left, weight = rows[:, :1], weak.target - rows[:, 1], weak.positive + weak.negative
+    rows = weak.project(jnp.concatenate([jnp.stack([friction, place], 1), jacobian], axis=1))
+    push = weak.rate(recording.velocity)[:, None]
+    left, weight = weak.target - rows[:, 0], weak.positive + weak.negative
     root = reduced.root(weight)
     mass = reduced.least_squares(root[:, None] * push, root * left)
     left = left - push @ mass
     # What the friction's error leaves is no noise of the rows: it comes in through the friction.
-    columns = jnp.concatenate([push, rows[:, 3:]], axis=1)
+    columns = jnp.concatenate([push, rows[:, 2:]], axis=1)
     basis = reduced.orthonormal(root[:, None] * columns)
     noise = reduced.project_out(basis, (root * left)[:, None])[:, 0]
     noise = jnp.where(root > 0, noise / jnp.where(root > 0, root, 1.0), 0.0)
-    own = uncertainty.deviations(push, noise, weight, rows[:, 2])
+    own = uncertainty.deviations(push, noise, weight, rows[:, 1])
     weighted = weight * push[:, 0]
     size = jnp.vdot(weighted, push[:, 0])
-    through = -(weighted @ rows[:, 3:]) / jnp.where(size > 0, size, 1.0)
+    through = -(weighted @ rows[:, 2:]) / jnp.where(size > 0, size, 1.0)
     return Weighed(mass[0], own, through, left, columns)
 
 
 def open_ends(
     columns: Float[Array, "N q"], slope: Float[Array, " N"], weight: Float[Array, " N"]
 ) -> Float[Array, " q"]:
-    """D⁻¹ ∫ v̇ g dt over all slip: what Lemma 1 makes zero where the end velocities are equal."""
-    root = reduced.root(weight)
-    return reduced.least_squares(root[:, None] * columns, root * slope)
+    """D⁻¹ ∫ v̇ g dt over all slip: what Lemma 1 makes zero where the end velocities are equal.
+
+    Zero for a parameter whose column the ones before it span.
+    """
+    weighted = weight[:, None] * columns
+    rounding = float(jnp.finfo(columns.dtype).eps) ** 0.5
+    white = small.whiten(columns.T @ weighted, rounding)[0]
+    return white @ (white.T @ (weighted.T @ slope))

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from ..data.printable import listed, short
 from ..data.recording import Recording, described
@@ -37,7 +37,9 @@ class Model(eqx.Module):
     F_slip(0+) of Kim, Kim & Ha (2004), eq. (4), at which the axis breaks away, N, shape `(2,)`,
     where they were measured; NaN or `None` where the slip curve's ends stand for them. `bristles`:
     stiffness σ₀, N/m, and damping σ₁, N·s/m, of LuGre's bristles (`terms.bristles`), shape `(2,)`;
-    `None` for friction that jumps at rest.
+    `None` for friction that jumps at rest. `force_limit`: what the actuator gives at most in either
+    direction, N; `None` where nothing is known of it. The force that a motion needs is not cut off
+    there, but of a command no more arrives.
     """
 
     term: AbstractTerm
@@ -47,6 +49,7 @@ class Model(eqx.Module):
     )
     breakaway: Float[Array, " 2"] | None = None
     bristles: Float[Array, " 2"] | None = None
+    force_limit: Float[Array, ""] | None = None
 
     @property
     def parameters(self) -> dict[str, Float[Array, ""]]:
@@ -121,6 +124,23 @@ class Model(eqx.Module):
             )
         return dataclasses.replace(self, breakaway=jnp.asarray(levels, self.alpha.dtype))
 
+    def with_force_limit(self, limit: float) -> "Model":
+        """The model with an actuator that gives no more, N.
+
+        **Raises:** `ValueError` for a limit that is not above zero.
+        """
+        if not 0 < limit < math.inf:
+            raise ValueError(f"The force limit is {limit:g}: a force above zero belongs there.")
+        return dataclasses.replace(self, force_limit=jnp.asarray(limit, self.alpha.dtype))
+
+    def arriving(self, command: Float[ArrayLike, "*shape"]) -> Float[Array, "*shape"]:
+        """What the actuator gives of commanded forces, N, any shape: all, up to `force_limit`."""
+        command = jnp.asarray(command)
+        if self.force_limit is None:
+            return command
+        limit = self.force_limit.astype(command.dtype)
+        return jnp.clip(command, -limit, limit)
+
     def with_parameters(self, values: Mapping[str, float]) -> "Model":
         """The model with some parameters replaced; raises `ValueError` for a name it lacks."""
         current = self.parameters
@@ -151,6 +171,9 @@ class Model(eqx.Module):
                 name: {"value": float(value), "unit": spell(dimension, dict(self.units))}
                 for (name, dimension), value in values
             }
+        if self.force_limit is not None:
+            unit = dict(self.units)["force"]
+            document["force_limit"] = {"value": float(self.force_limit), "unit": unit}
         return document
 
     @staticmethod
@@ -173,7 +196,8 @@ class Model(eqx.Module):
             ) from error
         model = from_parameters(term, values, saved.units_of(document.get("units", {})))
         model = _with_levels(model, document.get("breakaway"))
-        return _with_bristles(model, document.get("bristles"))
+        model = _with_bristles(model, document.get("bristles"))
+        return _with_limit(model, document.get("force_limit"))
 
     def __repr__(self) -> str:
         return text.shown(self, _blocks)
@@ -237,6 +261,9 @@ def _blocks(model: Model) -> Iterator[Block]:
         [f"  {name}", "=", f"{np.median(value):.5g}", spell(dimensions[name], units)]
         for name, value in model.parameters.items()
     ]
+    if model.force_limit is not None:
+        most = f"{np.median(model.force_limit):.5g}"
+        table.append(["  force_limit", "=", most, units["force"]])
     yield Table(table, (2,))
 
 
@@ -293,3 +320,15 @@ def _with_bristles(model: Model, values: Any) -> Model:
             "each with its value, belong there."
         ) from error
     return model.with_bristles(*pair)
+
+
+def _with_limit(model: Model, value: Any) -> Model:
+    """The model with the force limit of a document, where it has one."""
+    if value is None:
+        return model
+    if not isinstance(value, Mapping) or "value" not in value:
+        raise ValueError(
+            f"The model document's force_limit is {short(repr(value))}: a force with its value "
+            "belongs there."
+        )
+    return model.with_force_limit(saved.number("force_limit", value["value"]))

@@ -92,8 +92,9 @@ def steps(document: Mapping[str, Any]) -> list[str]:
         )
     for finding in document.get("not_confirmed") or ():
         found.append(
-            f"What looks like {spoken(finding['effect'])} here is not borne out by the held-out "
-            "recording, and is not in the model: record both motions once more, to see which holds."
+            f"What looks like {spoken(finding['effect'])} here does not make the model better on "
+            "the held-out recording, and is not in the model: record both motions once more, to "
+            "see which holds."
         )
     for finding in findings:
         if finding.get("confusable_with"):

@@ -1,5 +1,6 @@
 """Velocity without phase lag, noise, magnitudes, and what counts as slip."""
 
+from .choosing import choose as choose
 from .clock import (
     GAP_FACTOR as GAP_FACTOR,
     continuous as continuous,
@@ -9,6 +10,7 @@ from .clock import (
     is_traced as is_traced,
     quantile as quantile,
 )
+from .derivatives import derivative as derivative
 from .kernels import (
     kernel as kernel,
     kernel_slope as kernel_slope,
@@ -24,16 +26,15 @@ from .motion import (
     scales as scales,
     velocity_noise as velocity_noise,
 )
+from .noise import counted_noise as counted_noise, white_noise as white_noise
 from .parabolas import (
     TRACED_REACH as TRACED_REACH,
     choose_half_width as choose_half_width,
     local_quadratic as local_quadratic,
-    white_noise as white_noise,
+    mean_slope as mean_slope,
 )
 from .polynomial import (
     HALF_WIDTHS as HALF_WIDTHS,
     Choice as Choice,
-    choose as choose,
-    derivative as derivative,
     smoothing as smoothing,
 )

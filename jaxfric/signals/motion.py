@@ -9,15 +9,11 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..terms.sample import Scales
-from . import polynomial
+from .choosing import choose
 from .clock import host_continuous, host_interval, interval, is_traced, quantile
-from .parabolas import (
-    TRACED_REACH,
-    choose_half_width,
-    host_white_noise,
-    local_quadratic,
-    white_noise,
-)
+from .derivatives import derivative
+from .noise import host_white_noise, white_noise
+from .parabolas import TRACED_REACH, choose_half_width, local_quadratic
 from .polynomial import HALF_WIDTHS, Choice, weights
 
 # Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
@@ -42,9 +38,9 @@ def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
         span = (width + 0.5) * interval(recording)
         velocity = local_quadratic(recording, recording.position, span, TRACED_REACH)[1]
         return dataclasses.replace(recording, velocity=velocity)
-    choice = polynomial.choose(recording) if choice is None else choice
+    choice = choose(recording) if choice is None else choice
     position = np.asarray(recording.position)
-    slope = polynomial.derivative(recording, position, choice.half_width, choice.degree)
+    slope = derivative(recording, position, choice.half_width, choice.degree)
     usable = np.isfinite(position) | ~np.asarray(recording.mask)
     derived = np.where(usable, slope, np.nan).astype(position.dtype, copy=False)
     return dataclasses.replace(recording, velocity=derived)

@@ -1,7 +1,5 @@
 """Smoothing derivatives as pure functions of arrays, for use inside jit, vmap and grad."""
 
-from math import comb
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +8,8 @@ from jaxtyping import Array, Float
 from ..data.recording import Recording
 from .clock import continuous, interval
 from .kernels import kernel
-from .polynomial import COLOURED, HALF_WIDTHS, weights
+from .noise import COLOURED, white_noise
+from .polynomial import HALF_WIDTHS, weights
 
 # Inside jax.jit the width is data while the loop length is not, so the ladder ends earlier there.
 TRACED_REACH = 64
@@ -67,43 +66,23 @@ def local_quadratic(
     )
 
 
-def white_noise(
-    recording: Recording, signal: Float[Array, " N"], typical: Float[Array, ""]
-) -> Float[Array, ""]:
-    """Standard deviation of the white part of a signal, rounding to encoder counts included.
+def mean_slope(
+    recording: Recording, signal: Float[Array, " N"], reach: int, typical: Float[Array, ""]
+) -> Float[Array, " N"]:
+    """The signal's mean slope from `reach` samples before each sample to as many after it, `(N,)`.
 
-    By fourth differences, or by eighth ones where a motion of few samples a cycle shows in those,
-    as [`white_noise`][jaxfric.signals.polynomial.white_noise] does on the host. `typical` is the
-    sampling [`interval`][], s.
+    It ends where the recording breaks off, and is zero where a sample stands alone. `typical` is
+    the sampling [`interval`][], s.
     """
-    together = continuous(recording, typical)
-    fourth, eighth = (_by_differences(signal, together, order) for order in (4, 8))
-    return jnp.where(eighth < 0.5 * fourth, eighth, fourth)
-
-
-def _by_differences(signal, together, order: int) -> Float[Array, ""]:
-    factors = np.array([(-1) ** i * comb(order, i) for i in range(order + 1)], float)
-    size = signal.shape[0] - order
-    pieces = jnp.stack([signal[i : i + size] for i in range(order + 1)])
-    whole = jnp.all(jnp.stack([together[i : i + size] for i in range(order)]), axis=0)
-    used = whole & (pieces[0] != pieces[-1])
-    magnitude = jnp.where(used, jnp.abs(jnp.asarray(factors, signal.dtype) @ pieces), 0.0)
-    mean = jnp.sum(magnitude) / jnp.maximum(jnp.sum(used), 1).astype(signal.dtype)
-    # E|z| = σ √(2/π); the squared weights add to C(2n, n).
-    return mean * np.sqrt(np.pi / 2 / comb(2 * order, order)).astype(signal.dtype)
-
-
-def host_white_noise(signal: np.ndarray, together: np.ndarray) -> float:
-    """[`white_noise`][] on the host; `together`, `(N - 1,)`: samples that belong together."""
-    fourth, eighth = (_host_differences(signal, together, order) for order in (4, 8))
-    return eighth if eighth < 0.5 * fourth else fourth
-
-
-def _host_differences(signal: np.ndarray, together: np.ndarray, order: int) -> float:
-    broken = np.pad(np.cumsum(~together), (1, 0))
-    used = (broken[order:] == broken[:-order]) & (signal[order:] != signal[:-order])
-    mean = np.sum(np.abs(np.diff(signal, order)), where=used) / max(np.count_nonzero(used), 1)
-    return float(mean * np.sqrt(np.pi / 2 / comb(2 * order, order)))
+    linked, index = continuous(recording, typical), jnp.arange(recording.num_samples)
+    breaks_before = jnp.pad(~linked, (1, 0), constant_values=True)
+    breaks_after = jnp.pad(~linked, (0, 1), constant_values=True)
+    begin = jax.lax.cummax(jnp.where(breaks_before, index, 0))
+    end = jax.lax.cummin(jnp.where(breaks_after, index, index.size), reverse=True)
+    after, before = jnp.minimum(index + reach, end), jnp.maximum(index - reach, begin)
+    elapsed = recording.time[after] - recording.time[before]
+    moved = jnp.where(elapsed > 0, signal[after] - signal[before], 0.0)
+    return moved / jnp.where(elapsed > 0, elapsed, 1.0)
 
 
 def _ladder(size: int, reach: int) -> tuple[int, ...]:

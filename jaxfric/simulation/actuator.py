@@ -40,9 +40,12 @@ class History(NamedTuple):
 
 
 class Actuator(eqx.Module):
-    """What a model says of its actuator; `faults` holds the terms that are functions of f."""
+    """What a model says of its actuator; `faults` holds the terms that are functions of f, `whole`
+    the force limit.
+    """
 
     faults: Model | None
+    whole: Model
     delay: Scalar
     lag: Scalar
     depth: int = eqx.field(static=True)
@@ -82,6 +85,7 @@ class Actuator(eqx.Module):
 
     def arriving(self, force: Scalar, position: Scalar, rest: Surroundings) -> Array:
         """The force that the axis feels: one, or `(2,)` where it moves forward or backward."""
+        force = self.whole.arriving(force)
         if self.faults is None:
             return force
         most = jnp.abs(force) + _levels(self.faults)
@@ -118,7 +122,7 @@ def parted(model: Model, interval: float | None) -> tuple[Model, Actuator | None
     `interval`: the shortest time between samples, s; `None` inside `jax.jit`.
     """
     pairs = list(zip(summands(model.term), model.alphas(), strict=True))
-    if not any(PREDICTED in term.coordinates for term, _ in pairs):
+    if model.force_limit is None and not any(PREDICTED in t.coordinates for t, _ in pairs):
         return model, None
     times = {"delay": jnp.zeros_like(model.alpha[0]), "lag": jnp.zeros_like(model.alpha[0])}
     faults = []
@@ -134,7 +138,7 @@ def parted(model: Model, interval: float | None) -> tuple[Model, Actuator | None
     held = None
     if terms:
         held = Model(Sum(terms), jnp.concatenate([alpha for _, alpha in faults]), model.units)
-    return model.without("predicted_"), Actuator(held, times["delay"], times["lag"], depth)
+    return model.without("predicted_"), Actuator(held, model, times["delay"], times["lag"], depth)
 
 
 def _count(delay: Scalar, interval: float) -> float:

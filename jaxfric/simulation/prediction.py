@@ -179,16 +179,49 @@ def in_motion(
 
     Valid ones, without [`outliers`][], that are faster than the slowest speed that is told from
     rest, by [`signals.scales`][]; of a model with a `delay`, s, also that much later, which is what
-    its force is for. At rest friction takes any value up to break-away. `prepared`: as in
-    [`residual`][].
+    its force is for. At rest friction takes any value up to break-away, and at a reversal it jumps,
+    and the acceleration with it: where the derivative of the momentum reaches into one of these, it
+    is of both sides. `prepared`: as in [`residual`][].
     """
     motion = Prepared.of(recording) if prepared is None else prepared
     slowest = float(signals.host_scales(excerpt(motion.recording))[0].slowest)
-    moving = np.abs(np.asarray(motion.recording.velocity))[: recording.num_samples] > slowest
-    moving &= np.asarray(recording.mask)
+    velocity = np.asarray(motion.recording.velocity)[: recording.num_samples]
+    moving = np.abs(velocity) > slowest
+    valid = np.asarray(recording.mask)
+    moving &= valid & ~_beside_turns(np.sign(velocity) * moving, valid, motion.choice.half_width)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
+        moving &= _within(recording, delay)
     return moving & ~outliers(recording)
+
+
+def _within(recording: Recording, delay: float) -> Bool[np.ndarray, " N"]:
+    """Whether the motion that much later is in the recording: at its end it is not."""
+    time = jnp.asarray(recording.time)
+    later = np.asarray(_later(recording, time, delay) - time)
+    return np.abs(later - delay) < 0.5 * float(signals.host_interval(recording))
+
+
+# An axis that is nearer to a stop or a reversal in most of its motion has no other samples.
+MOSTLY = 0.5
+
+
+def _beside_turns(
+    side: Float[np.ndarray, " N"], valid: Bool[np.ndarray, " N"], reach: int
+) -> Bool[np.ndarray, " N"]:
+    """The samples within the `reach` of the derivative from a stop or a reversal, `(N,)`.
+
+    **Arguments:** `side`, the direction of motion, 0 at rest, `(N,)`; `valid` samples, which alone
+    have one.
+    """
+    known = np.flatnonzero(valid)
+    changes = np.flatnonzero(np.diff(side[known]))
+    beside = np.zeros(side.size + 1, int)  # so many more changes are near from here on
+    np.add.at(beside, np.maximum(known[changes] + 1 - reach, 0), 1)
+    np.add.at(beside, np.minimum(known[changes + 1] + reach, side.size), -1)
+    near = np.cumsum(beside[:-1]) > 0
+    few = np.count_nonzero(near & valid & (side != 0)) < MOSTLY * np.count_nonzero(side[known])
+    return near if few else np.zeros_like(near)
 
 
 def unseen(names: Sequence[str], recording: Recording) -> list[str]:
@@ -209,7 +242,7 @@ def delay_of(model: Model) -> float:
 def residual(
     model: Model, recording: Recording, prepared: Prepared | None = None
 ) -> Float[np.ndarray, " N"]:
-    """The recorded force less the one by [`predict`][], N, `(N,)`, on the host.
+    """The force that arrived less the one by [`predict`][], N, `(N,)`, on the host.
 
     `prepared`: the recording made [`uniform`][jaxfric.data.recording] and prepared, where that has
     been done.
@@ -217,11 +250,18 @@ def residual(
     require_model(model, "predict")
     motion = Prepared.of(recording) if prepared is None else prepared
     predicted = np.asarray(_force(model, motion), float)[: recording.num_samples]
-    return np.asarray(recording.force, float) - predicted
+    return arrived(model, recording) - predicted
+
+
+def arrived(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
+    """What arrived of the recorded force, N, `(N,)`: no more than a force limit of the model."""
+    force, limit = np.asarray(recording.force, float), model.force_limit
+    return force if limit is None else np.clip(force, -float(limit), float(limit))
 
 
 def force_error(model: Model, recording: Recording) -> float:
-    """norm(u − û)/norm(u) over the samples [`in_motion`][], with û by [`predict`][].
+    """norm(u − û)/norm(u) over the samples [`in_motion`][], with û by [`predict`][], u the recorded
+    force, of a command no more than the model's force limit.
 
     No filter but the derivative in û: the noise of the recorded force is in it. NaN where nothing
     moves or no force is recorded.
@@ -230,7 +270,7 @@ def force_error(model: Model, recording: Recording) -> float:
     moving = in_motion(recording, delay_of(model), prepared)
     left = residual(model, recording, prepared)[moving]
     del prepared
-    return relative(left, np.asarray(recording.force, float)[moving])
+    return relative(left, arrived(model, recording)[moving])
 
 
 def relative(left: Float[np.ndarray, " M"], force: Float[np.ndarray, " M"]) -> float:
@@ -248,6 +288,8 @@ def relative_error(
     `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
     """
     model, delay = _at_once(model)
+    if model.force_limit is not None:
+        recording = dataclasses.replace(recording, force=model.arriving(recording.force))
     prepared = with_channels(model, signals.prepare(recording))
     if delay is not None:
         prepared = dataclasses.replace(prepared, force=_later(prepared, prepared.force, -delay))

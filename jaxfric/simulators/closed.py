@@ -34,11 +34,15 @@ class Log(NamedTuple):
 
 
 class Law(NamedTuple):
-    """A controller: the gains of its parts, `(dof, parts)`, and what it leaves of each command."""
+    """A controller: the gains of its parts, `(dof, parts)`, and what it leaves of each command.
+
+    `model`: that whose gravity and motion it computes; it stays so whatever machine it drives.
+    """
 
     parts: tuple[str, ...]
     gains: np.ndarray
     left: np.ndarray
+    model: Any
 
     @property
     def known(self) -> bool:
@@ -55,11 +59,15 @@ def bias(mujoco: Any, model: Any, motion: Motion) -> np.ndarray:
     """Gravity, centrifugal and Coriolis forces along a motion, `(N, dof)`."""
     data, found = mujoco.MjData(model), np.empty(motion.position.shape)
     for i in range(len(found)):
-        data.qpos[:], data.qvel[:] = motion.position[i], motion.velocity[i]
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        found[i] = data.qfrc_bias
+        found[i] = _bias(mujoco, model, data, motion.position[i], motion.velocity[i])
     return found
+
+
+def _bias(mujoco: Any, model: Any, data: Any, position, velocity) -> np.ndarray:
+    data.qpos[:], data.qvel[:] = position, velocity
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    return data.qfrc_bias.copy()
 
 
 def law_of(mujoco: Any, model: Any, log: Log) -> Law:
@@ -86,7 +94,7 @@ def law_of(mujoco: Any, model: Any, log: Log) -> Law:
         more, less = _fitted(every, [*chosen, part], log.force)
         if np.any(less < WORTH * left):
             chosen, gains, left = [*chosen, part], more, less
-    return Law(tuple(chosen), gains, left)
+    return Law(tuple(chosen), gains, left, model)
 
 
 def _fitted(every: Mapping[str, np.ndarray], chosen: Sequence[str], force: np.ndarray):
@@ -151,7 +159,7 @@ def run(
     data.qpos[:], data.qvel[:] = log.motion.position[0], log.motion.velocity[0]
     _begin(data, model, log, law, actuation)
     found = np.full(log.motion.position.shape, np.nan)
-    loop = _Loop(model, log, law, actuation)
+    loop = _Loop(mujoco, model, log, law, actuation)
     most = LOST * np.ptp(log.motion.position, axis=0)
     for i, (start, span) in enumerate(
         zip(log.time, np.diff(log.time, append=log.time[-1]), strict=True)
@@ -183,7 +191,8 @@ def _begin(data: Any, model: Any, log: Log, law: Law | None, actuation: Actuatio
 class _Loop:
     """A controller at work."""
 
-    def __init__(self, model: Any, log: Log, law: Law | None, actuation: Actuation):
+    def __init__(self, mujoco: Any, model: Any, log: Log, law: Law | None, actuation: Actuation):
+        self.mujoco, self.known = mujoco, None if law is None else mujoco.MjData(law.model)
         self.log, self.law, self.actuation = log, law, actuation
         goal = np.gradient(log.reference, log.time, axis=0)
         self.goals = [log.reference, goal, np.gradient(goal, log.time, axis=0)]
@@ -209,7 +218,7 @@ class _Loop:
         values = {
             "position error": error,
             "velocity error": speed - data.qvel,
-            "gravity and motion": data.qfrc_bias,
+            "gravity and motion": self._weight(data),
             "constant": np.ones_like(error),
             "integral": self.sum,
             "acceleration": rate,
@@ -219,6 +228,13 @@ class _Loop:
         for joint, number in self.actuation.actuators.items():
             data.ctrl[number], acting[joint] = acting[joint], 0.0
         data.qfrc_applied[:] = acting
+
+    def _weight(self, data: Any) -> np.ndarray:
+        """Gravity and motion as the controller knows them; zero where it does not ask."""
+        assert self.law is not None
+        if "gravity and motion" not in self.law.parts:
+            return np.zeros_like(data.qpos)
+        return _bias(self.mujoco, self.law.model, self.known, data.qpos, data.qvel)
 
     def _lagging(self, arriving: np.ndarray, span: float) -> np.ndarray:
         lag = self.actuation.lag

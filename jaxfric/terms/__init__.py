@@ -8,7 +8,10 @@ from .base import (
 )
 from .effects.actuator_deadband import ActuatorDeadband as ActuatorDeadband
 from .effects.actuator_saturation import ActuatorSaturation as ActuatorSaturation
-from .effects.asymmetric_friction import FrictionAsymmetry as FrictionAsymmetry
+from .effects.asymmetric_friction import (
+    CoulombAsymmetry as CoulombAsymmetry,
+    FrictionAsymmetry as FrictionAsymmetry,
+)
 from .effects.backlash import Backlash as Backlash, ElasticBacklash as ElasticBacklash
 from .effects.cogging import Cogging as Cogging
 from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance

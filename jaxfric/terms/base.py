@@ -290,6 +290,22 @@ def leaves(term: AbstractTerm) -> Iterator[AbstractTerm]:
             yield part
 
 
+def changed_columns(term: AbstractTerm) -> list[range]:
+    """For each nonlinear parameter the columns that it changes, as their numbers."""
+    if isinstance(term, Sum):
+        parts: tuple[AbstractTerm, ...] = term.terms
+    elif isinstance(term, Directional):
+        parts = (term.positive, term.negative)
+    else:
+        return [range(len(term.affine))] * len(term.nonlinear)
+    found, first = [], 0
+    for part in parts:
+        inside = changed_columns(part)
+        found += [range(first + own.start, first + own.stop) for own in inside]
+        first += len(part.affine)
+    return found
+
+
 def bounds(
     term: AbstractTerm, scales: Scales, given: Mapping[str, tuple[float, float]] | None = None
 ) -> Float[Array, "2 d"]:

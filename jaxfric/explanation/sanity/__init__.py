@@ -1,10 +1,12 @@
 """Sanity before physics: what a log and a simulator differ in that no missing physics is."""
 
-from .looked import (
-    Looked as Looked,
+from .bounded import bounded as bounded, with_limit as with_limit
+from .checked import (
+    CheckedSimulator as CheckedSimulator,
     Part as Part,
-    look as look,
-    looked_at as looked_at,
-    told as told,
+    check_log as check_log,
+    check_logs as check_logs,
+    with_checks as with_checks,
 )
+from .limits import arrived as arrived
 from .table import Check as Check

@@ -16,7 +16,7 @@ from ...data.recording import Recording
 from ...simulators import Mujoco
 from ..acceptance import LINEARITY
 from ..least_squares import orthonormal
-from ..mismatch import fewest
+from ..mismatch import MOST_WRONG, fewest
 from ..predictions import rate
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
@@ -54,7 +54,7 @@ class Faults(NamedTuple):
         return bool(self.late or self.drift)
 
 
-class Seen(NamedTuple):
+class FaultSearch(NamedTuple):
     """Where the search ended: the faults, what can be seen of those that are none, the rows, and
     the part of the mismatch that they and the wrong values leave.
     """
@@ -66,7 +66,7 @@ class Seen(NamedTuple):
     left: float = 1.0
 
 
-def find(parts: Sequence[Part]) -> Seen:
+def find(parts: Sequence[Part]) -> FaultSearch:
     """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
     seen = _found(parts, Faults())
     late = _shift([_rows(part) for part in parts])
@@ -77,7 +77,7 @@ def find(parts: Sequence[Part]) -> Seen:
     return shifted if shifted.faults.clock and shifted.left < HALVED * seen.left else seen
 
 
-def _found(parts: Sequence[Part], faults: Faults) -> Seen:
+def _found(parts: Sequence[Part], faults: Faults) -> FaultSearch:
     rows = [_rows(part, faults) for part in parts]
     before = _energy(rows if not faults.late else [_rows(part) for part in parts])
     known = {OFFSET} if faults.late else set[str]()
@@ -101,14 +101,17 @@ def _found(parts: Sequence[Part], faults: Faults) -> Seen:
     names = [n for n in stack.names if _is_fault(n) or n.endswith(": gain")]
     beside = list(dict.fromkeys([*beside, OFFSET]))
     each = {n: estimate(stack, [*(b for b in beside if b != n), n])[n] for n in names}
-    return Seen(faults, each, chosen, rows, left)
+    return FaultSearch(faults, each, chosen, rows, left)
 
 
 def _new(stack: Stack, chosen: Sequence[str]) -> set[str]:
     """The faults among the columns that were chosen: a clock has to halve what all else leaves.
 
-    A value that changes in the middle looks a little like a clock that drifts.
+    A value that changes in the middle looks a little like a clock that drifts. Where few columns do
+    not account for the mismatch, it is of another kind, and zeros would only imitate it.
     """
+    if len(chosen) > MOST_WRONG:
+        return set()
     new = {name for name in chosen if _is_fault(name)}
     others = [name for name in stack.names if not name.startswith(OFFSET)]
     if energy(stack, chosen) > HALVED * energy(stack, others):

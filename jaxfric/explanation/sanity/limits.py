@@ -6,8 +6,9 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
-from ...simulation.prediction import in_motion
+from ...simulation.prediction import Prepared, in_motion
 from ...terms import KNOWN_FORCE
+from ..least_squares import solve
 from ..significance import FEWEST
 
 # Of the mismatch in the samples that ask for more: what a clip leaves of it, and of all of it; and
@@ -16,6 +17,9 @@ LEAVES, LEAVES_IN_ALL = 0.25, 0.5
 # A machine that is at its limit most of the time does not do what it is told.
 MOST = 0.5
 LEVELS = 200
+# Of what wrong values leave, what a clip has to: where friction is most of the force, a wrong level
+# of it, in one direction or both, is near a clip.
+HALVED = 0.5
 
 
 def hard_limit(recording: Recording) -> Estimate | None:
@@ -23,30 +27,55 @@ def hard_limit(recording: Recording) -> Estimate | None:
     beside it; `None` where the command and what the motion needed do not part so.
     """
     command = np.asarray(recording.force, float)
-    known = np.asarray(recording.channels[KNOWN_FORCE], float)
-    moving = in_motion(recording) & np.isfinite(command)
-    size, needed = np.abs(command[moving]), np.sign(command[moving]) * known[moving]
-    mismatch = (size - needed) ** 2
+    prepared = Prepared.of(recording)
+    moving = in_motion(recording, prepared=prepared) & np.isfinite(command)
+    known = np.asarray(recording.channels[KNOWN_FORCE], float)[moving]
+    speed = np.asarray(prepared.recording.velocity, float)[: len(command)][moving]
+    return limit_of(command[moving], known, speed, recording.unit_names["force"])
+
+
+def cut(size: np.ndarray, needed: np.ndarray) -> tuple[float, float]:
+    """The level at which a command's size `(M,)` is cut off to be nearest to what was needed, and
+    what that leaves of the mismatch.
+    """
     levels = np.quantile(size, np.linspace(1 - MOST, 1, LEVELS + 1))[:-1]
     left = np.array([np.sum((np.minimum(size, level) - needed) ** 2) for level in levels])
-    level = float(levels[int(np.argmin(left))])
+    best = int(np.argmin(left))
+    return float(levels[best]), float(left[best] / max(np.sum((size - needed) ** 2), 1e-300))
+
+
+def limit_of(
+    command: np.ndarray, known: np.ndarray, speed: np.ndarray, unit: str
+) -> Estimate | None:
+    """The limit by the command, what the motion needed, N, and the velocity, `(M,)` each."""
+    size, needed = np.abs(command), np.sign(command) * known
+    mismatch = (size - needed) ** 2
+    level, left = cut(size, needed)
     beyond = size > level
-    if np.count_nonzero(beyond) < FEWEST or not left.min() < LEAVES_IN_ALL * mismatch.sum():
+    if np.count_nonzero(beyond) < FEWEST or not left < LEAVES_IN_ALL:
         return None
     level = float(np.mean(needed[beyond]))  # what arrived there
     beyond = size > level
     inside = np.sum((level - needed[beyond]) ** 2)
     if not inside < LEAVES * np.sum(mismatch[beyond]):
         return None
+    if not left * mismatch.sum() < HALVED * _by_values(command, known, speed):
+        return None
     excess = size[beyond] - np.mean(size[beyond])
     part = float(excess @ needed[beyond]) / max(float(excess @ excess), 1e-300)
     if abs(part) > LEAVES:
         return None
     visits = np.flatnonzero(np.diff(beyond.astype(int), prepend=0) == 1)
-    spread = float(np.std(needed[beyond]))
-    unit = recording.unit_names["force"]
-    error = spread / np.sqrt(max(len(visits), 1))
+    error = float(np.std(needed[beyond])) / np.sqrt(max(len(visits), 1))
     return Estimate(np.float64(level), np.float64(error), unit)
+
+
+def _by_values(command: np.ndarray, known: np.ndarray, speed: np.ndarray) -> float:
+    """What a gain, friction and a constant of other values leave of the mismatch, N²."""
+    columns = np.stack([known, np.sign(speed), speed, np.ones_like(speed)], axis=1)
+    rest = command - known
+    rest = rest - columns @ solve(columns, rest)
+    return float(rest @ rest)
 
 
 def arrived(recording: Recording, limit: Estimate | None) -> Recording:

@@ -11,7 +11,7 @@ from ...terms.effects.end_stop import END_STOP
 from ..quantities import quantity
 from . import limits
 from .contact import Contact
-from .faults import DRIFT, OFFSET, ZERO, Seen
+from .faults import DRIFT, OFFSET, ZERO, FaultSearch
 from .rows import Part
 from .wiring import Wiring
 
@@ -57,7 +57,7 @@ def _plain(number) -> float | None:
 
 
 def checks_of(
-    part: Part, seen: Seen, bound: Estimate | None, blocked: Sequence[Contact], wired: Wiring
+    part: Part, seen: FaultSearch, bound: Estimate | None, blocked: Sequence[Contact], wired: Wiring
 ) -> list[Check]:
     """The table of one joint."""
     return [
@@ -79,7 +79,7 @@ def _wiring(part: Part, said: Mapping[str, str], everywhere: bool) -> Check:
     return Check("columns", "No other joint's columns fit better.")
 
 
-def _gain(part: Part, seen: Seen) -> list[Check]:
+def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     """Sign and size of the force as a whole, beside all else that is wrong."""
     name = next((n for n in seen.values if n == f"{part.name}: gain"), None)
     if name is None:
@@ -106,7 +106,7 @@ def _gain(part: Part, seen: Seen) -> list[Check]:
     ]
 
 
-def _zeros(part: Part, seen: Seen) -> list[Check]:
+def _zeros(part: Part, seen: FaultSearch) -> list[Check]:
     """The zeros of the encoders: of all joints, for each may show in this one's force."""
     if not isinstance(part.simulator, Mujoco):
         return []
@@ -136,7 +136,7 @@ def _zeros(part: Part, seen: Seen) -> list[Check]:
 _APART = "Log force and motion by one clock, or a step of both."
 
 
-def _clock(part: Part, seen: Seen) -> Check:
+def _clock(part: Part, seen: FaultSearch) -> Check:
     faults = seen.faults
     if faults.clock:
         error = faults.errors.get(OFFSET, 0.0)
@@ -218,3 +218,12 @@ def _ends(part: Part) -> list[Check]:
         if touch >= 0.5:
             text = f"{' and '.join(said).capitalize()}, so that their contact is left out."
     return [Check("joint_limit", text, bool(said))]
+
+
+# Of what is reported as a finding.
+EQUATIONS = {
+    "position_zero": "f(q − z)",
+    "clock": "u(t) = f(t − τ)",
+    "force_limit": "u_real = clip(u, ±U)",
+    END_STOP.name: "x ≤ x_s, or x ≥ x_s",
+}

@@ -23,7 +23,7 @@ class Wiring(NamedTuple):
     everywhere: bool = True
 
 
-def look(parts: Sequence[Part], rows: Sequence[Rows]) -> Wiring:
+def wiring_of(parts: Sequence[Part], rows: Sequence[Rows]) -> Wiring:
     """Whether forces are repeated or swapped, positions swapped or counted the other way."""
     said = _repeated(parts)
     bad = [i for i, own in enumerate(rows) if _left(own, own.known) > WRONG]

@@ -213,4 +213,5 @@ BACKLASH = Effect(
     leftover=True,
     grid=gaps,
     sizes=("backlash_force",),
+    vanishes=("half_gap",),
 )

@@ -162,4 +162,5 @@ FRICTIONAL_LAG = Effect(
     sharp=True,
     grid=memories,
     sizes=("stribeck_force",),
+    vanishes=("frictional_lag",),
 )

@@ -87,4 +87,5 @@ PRESLIDING = Effect(
     first_order=True,
     at_reversals=True,
     sizes=("presliding_force",),
+    vanishes=("presliding_distance",),
 )

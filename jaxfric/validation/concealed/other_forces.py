@@ -12,7 +12,7 @@ from .nominal import Columns, Kind, Truth, rms, scaled
 
 
 def _triangular(truth, n):
-    return truth["amplitude"] * 2 / np.pi * np.arcsin(
+    return truth["peak"] * 2 / np.pi * np.arcsin(
         np.sin(TURN * n.x / truth["pitch"] + truth["phases"][0])
     )  # fmt: skip
 
@@ -41,11 +41,11 @@ TRIANGLE = _redrawn(
     places.COGGING._replace(
         force=_triangular,
         physics=lambda truth, base: {
-            "pitch": truth["pitch"], "triangle": truth["amplitude"],
+            "pitch": truth["pitch"], "triangle": truth["peak"],
             "cogging_phase1": truth["phases"][0],
         },
     ),
-    "amplitude",
+    "peak",
     lambda rng, kept: {},
 )  # fmt: skip
 RIPPLE = _redrawn(

@@ -50,19 +50,21 @@ def _bent(truth, n):
     return knee * np.arctanh(n.u / knee) - n.u
 
 
-def _limit(shape: float, tuned: str, force, knee, bounds) -> Kind:
+def _limit(shape: float, tuned: str, force, name: str, knee, bounds) -> Kind:
     kind = memories.SATURATION._replace(
         force=force,
-        physics=lambda truth, base: {"knee": truth["knee"], "saturation_shape": shape},
+        physics=lambda truth, base: {"knee": truth[name], "saturation_shape": shape},
+        where=lambda truth: f"force beyond {truth[name]:.3g}",
         tuned=tuned,
         bounds=lambda n: bounds,
-        complete=lambda truth, n: truth | {"knee": knee(truth[tuned], _peak(n))},
+        complete=lambda truth, n: truth | {name: knee(truth[tuned], _peak(n))},
     )
     return kind._replace(draw=lambda rng, n, size: solved(kind, {}, n, size))
 
 
-CLIPPED = _limit(CLIP, "cut", _clipped, lambda cut, peak: peak * (1 - cut), (0.01, 0.6))
-BENT = _limit(TANH, "use", _bent, lambda use, peak: peak / use, (0.05, 0.98))
+CLIPPED = _limit(CLIP, "cut", _clipped, "knee", lambda cut, peak: peak * (1 - cut), (0.01, 0.6))
+# The level that a tanh never reaches is no knee.
+BENT = _limit(TANH, "use", _bent, "level", lambda use, peak: peak / use, (0.05, 0.98))
 SMOOTH_GAP = with_physics(memories.DEADBAND, lambda truth: {"deadband_shape": TANH})
 TWO_STAGES = memories.LAG._replace(
     physics=lambda truth, base: {"lag": 0.5 * truth["lag"], "lag_stages": 2.0}

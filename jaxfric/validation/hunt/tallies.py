@@ -61,7 +61,7 @@ def _flagged(answer: Answer) -> bool:
 
 def _beware(verdict: Answer, answer: Answer) -> bool:
     """Whether a command refused or warned; that something is left unexplained is no warning, nor
-    that a finding was dropped since it made the model worse.
+    that a finding was dropped since it made the model worse, or that reversals were left out.
     """
     signs = set(verdict["signs"])
     if answer.get("velocity_error", 0.0) > UNRESOLVED:
@@ -69,7 +69,7 @@ def _beware(verdict: Answer, answer: Answer) -> bool:
     if answer.get("lacks"):
         signs -= {"structure_left"}
     undetermined = verdict["outcome"] == "refused" and signs <= UNDETERMINED
-    no_warning = verdict["outcome"] == "warned" and signs <= {*UNSURE, "not_better"}
+    no_warning = verdict["outcome"] == "warned" and signs <= {*UNSURE, "not_better", "creeps"}
     return verdict["outcome"] in ("refused", "warned") and not (undetermined or no_warning)
 
 

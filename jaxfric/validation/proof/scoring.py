@@ -7,12 +7,17 @@ from typing import Any, NamedTuple
 
 from ...identification.uncertainty import COSINES, student_quantile
 from ...terms.effects import EFFECTS
+from ...terms.effects.actuator_saturation import ACTUATOR_SATURATION
 from .planning import Case
 from .trials import ANSWERS, REMEDY, SEALED, path, read
 
 # What an oracle that knows the truth removes of the error must be more than the chance of a
 # held-out recording, for the part of it that was reached to be a number of any meaning.
 LEAST_REDUCTION = 0.1
+
+# What has another name where it is looked at before any physics: a saturation beyond which nothing
+# arrives.
+CALLED = {"force_limit": ACTUATOR_SATURATION.name}
 
 
 class Parameter(NamedTuple):
@@ -63,7 +68,8 @@ class Score(NamedTuple):
     - `before`, `after`, `oracle`: held-out force errors; `without`: the oracle's, of several
       effects, if it knows all but one; `run_before`, `run_after`: held-out velocity errors of the
       models run forward.
-    - `parameters` that truth and finding both have; `seconds` that `explain` took; `code`.
+    - `parameters` that the truth and the strongest finding of the effect both have; `seconds` that
+      `explain` took; `code`.
     - `definitions`: of each effect, or of how it sticks and is logged, what it is of and its name;
       `beliefs`: every finding with how sure it is.
     """
@@ -149,7 +155,7 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
     if answer["error"] is not None:
         return first._replace(error=answer["error"])
     findings = answer["findings"]
-    named = tuple(finding["effect"] for finding in findings)
+    named = tuple(_effect(finding) for finding in findings)
     alike = tuple({name: 0 for finding in findings for name in finding["confusable_with"]})
     run = answer.get("run") or {}
     wanted, held = set(case.effects), held_out(answer["fit"]) or {}
@@ -168,13 +174,26 @@ def score(case: Case, sealed: Mapping[str, Any] | None, answer: Mapping[str, Any
         without=tuple(answer.get("oracle_without", {}).values()),
         run_before=run.get("before"),
         run_after=run.get("after"),
-        parameters=tuple(p for finding in findings for p in _parameters(finding, truth)),
+        parameters=tuple(p for finding in _firsts(findings) for p in _parameters(finding, truth)),
         beliefs=tuple(_belief(finding, wanted) for finding in findings),
     )
 
 
+def _firsts(findings: Sequence[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
+    """The strongest finding of each effect: a second one is a harmonic with other numbers."""
+    seen: set[str] = set()
+    for finding in findings:
+        if finding["effect"] not in seen:
+            yield finding
+        seen.add(finding["effect"])
+
+
+def _effect(finding: Mapping[str, Any]) -> str:
+    return CALLED.get(finding["effect"], finding["effect"])
+
+
 def _belief(finding: Mapping[str, Any], wanted: set[str]) -> Belief:
-    effect, alike = finding["effect"], set(finding["confusable_with"])
+    effect, alike = _effect(finding), set(finding["confusable_with"])
     return Belief(
         effect,
         finding.get("p_value"),

@@ -133,7 +133,7 @@ def oracle(run: Run, machine: Machine, unknown: str = "") -> float | None:
     )
     run_less, holdout_less = _without(run.recording, first), _without(run.holdout, second)
     problem = problem_of(run_less, structure)
-    known = with_holdout(across_reversals(run_less, problem) or problem, holdout_less)
+    known = with_holdout(across_reversals(run_less, problem), holdout_less)
     for candidates in known.candidate_sets:
         candidates.close()  # nobody asks for the candidates' columns
     rows = known.evidence.width, known.delay, known.reversals

@@ -3,7 +3,6 @@
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,21 +13,21 @@ from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.prediction import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
-from ...terms.effects.end_stop import END_STOP
 from ..explained import Explanation
 from ..figures import Figures, cast
 from ..finding import Finding
 from . import limits, wiring
 from .contact import Contact, contacts
-from .faults import Faults, Seen, find, put_right
+from .faults import Faults, FaultSearch, find, put_right
+from .preceding import p_value, with_preceding
 from .rows import Part, Rows, rows_of
-from .table import Check, checks_of
+from .table import EQUATIONS, Check, checks_of
 
 # Said of a force that stays at the end of its range.
 CLIPPED = "force_clipped"
 
 
-class Looked(AbstractSimulator):
+class CheckedSimulator(AbstractSimulator):
     """A simulator whose log has been looked at: what is put right, and the table."""
 
     def __init__(self, part: Part, raw: Part, faults: Faults, limit: Estimate | None,
@@ -46,10 +45,10 @@ class Looked(AbstractSimulator):
     def attributes(self) -> Mapping[str, Attribute]:
         return self.part.simulator.attributes()
 
-    def standing_on(self, simulator: AbstractSimulator) -> "Looked":
+    def standing_on(self, simulator: AbstractSimulator) -> "CheckedSimulator":
         """The same of a simulator some of whose values have been put right since."""
         part = self.part._replace(simulator=simulator)
-        return Looked(
+        return CheckedSimulator(
             part, self.raw, self.faults, self.limit, self.blocked, self.checks, self.power
         )
 
@@ -80,7 +79,7 @@ class Looked(AbstractSimulator):
         return next((check.text for check in self.checks if check.severe), None)
 
 
-def look(parts: Sequence[Part]) -> list[Looked]:
+def check_logs(parts: Sequence[Part]) -> list[CheckedSimulator]:
     """What each joint's log differs in from its simulator that no physics is.
 
     **Raises:** `ValueError` if an axis hardly slips.
@@ -90,25 +89,25 @@ def look(parts: Sequence[Part]) -> list[Looked]:
         blocked = [contacts(part.simulator.beside(part.recording)) for part in parts]
         parts = [_apart(*each) for each in zip(parts, blocked, strict=True)]
         raw = [_rows(part) for part in parts]
-        wired = wiring.look(parts, raw)
+        wired = wiring.wiring_of(parts, raw)
         bounds = [_limit(part) for part in parts]
         clipped = [_arrived(part, bound) for part, bound in zip(parts, bounds, strict=True)]
         able = not wired.said or not wired.everywhere
-        seen = find(clipped) if able else Seen(Faults(), {}, (), raw)
+        seen = find(clipped) if able else FaultSearch(Faults(), {}, (), raw)
         ends = zip(bounds, blocked, strict=True)
         return [
-            _looked(*each, seen, wired)
+            _corrected(*each, seen, wired)
             for each in zip(parts, clipped, raw, seen.rows, ends, strict=True)
         ]
 
 
-def looked_at(
+def check_log(
     recording: Recording, simulator: AbstractSimulator, holdout: Recording | None
-) -> Looked:
+) -> CheckedSimulator:
     """The simulator of a recording by itself, looked at, if it is not yet."""
-    if isinstance(simulator, Looked):
+    if isinstance(simulator, CheckedSimulator):
         return simulator
-    return look([Part(recording, holdout, simulator, getattr(simulator, "joint", ""))])[0]
+    return check_logs([Part(recording, holdout, simulator, getattr(simulator, "joint", ""))])[0]
 
 
 def _cast(part: Part) -> Part:
@@ -144,10 +143,10 @@ def _arrived(part: Part, bound: Estimate | None) -> Part:
     return part._replace(recording=limits.arrived(part.recording, bound), holdout=held)
 
 
-def _looked(
+def _corrected(
     raw: Part, clipped: Part, before: Rows, after: Rows,
-    ends: tuple[Estimate | None, Sequence[Contact]], seen: Seen, wired,
-) -> Looked:  # fmt: skip
+    ends: tuple[Estimate | None, Sequence[Contact]], seen: FaultSearch, wired,
+) -> CheckedSimulator:  # fmt: skip
     faults, (bound, blocked) = seen.faults, ends
     simulator = clipped.simulator
     if any(faults.zeros.values()) and isinstance(simulator, Mujoco):
@@ -155,78 +154,54 @@ def _looked(
     held = None if clipped.holdout is None else put_right(clipped.holdout, faults)
     part = Part(put_right(clipped.recording, faults), held, simulator, clipped.name)
     table = checks_of(raw, seen, bound, blocked, wired)
-    return Looked(part, raw, faults, bound, blocked, table, (before.power, after.power))
+    return CheckedSimulator(part, raw, faults, bound, blocked, table, (before.power, after.power))
 
 
-def told(found: Explanation, looked: Looked, x64: bool) -> Explanation:
+def with_checks(found: Explanation, checked: CheckedSimulator, x64: bool) -> Explanation:
     """An explanation with what was looked at first: its table, and findings for what was wrong."""
-    rows = [check.to_dict() for check in looked.checks]
+    rows = [check.to_dict() for check in checked.checks]
     found = dataclasses.replace(found, sanity=rows)
-    findings = [] if looked.wrong else _findings(looked)
+    findings = [] if checked.wrong else _findings(checked)
     if not findings:
         return found
-    before, after = looked.power
-    part = after / before if before > 0 else 1.0
-    others = [f._replace(share=f.share * part) for f in found.findings]
-    pictures = [None] * len(findings) + list(found.curves.get("findings", ()))
-    verdicts = {"consistent": "explained", "unexplained": "partly_explained"}
-    verdict = verdicts.get(found.verdict, found.verdict)
-    return dataclasses.replace(
-        found,
-        findings=[*findings, *others],
-        curves=found.curves | {"findings": pictures},
-        verdict=verdict,
-        fit=_errors(found, looked, x64),
-    )
+    before, after = checked.power
+    left = after / before if before > 0 else 1.0
+    return with_preceding(found, findings, left, _before(found, checked, x64))
 
 
-def _errors(found: Explanation, looked: Looked, x64: bool) -> dict[str, Any]:
-    """The errors with those before anything was put right."""
-    raw = looked.raw
+def _before(found: Explanation, checked: CheckedSimulator, x64: bool) -> dict[str, float]:
+    """The errors before anything was put right."""
+    raw = checked.raw
     log = raw.simulator.beside(raw.recording)
     held = None if raw.holdout is None else raw.simulator.beside(raw.holdout, held_out=True)
     model = raw.simulator.baseline(log.units)
     figures = Figures(log, held, x64)
-    fit = dict(found.fit)
-    fit["force_error"] = fit["force_error"] | {"before": figures.here(model)}
-    size = math.sqrt(looked.power[0])
-    fit["filtered_force_error"] = fit["filtered_force_error"] | {"before": size}
-    if held is not None and fit.get("holdout_force_error"):
+    size = math.sqrt(checked.power[0])
+    errors = {"force_error": figures.here(model), "filtered_force_error": size}
+    if held is not None and found.fit.get("holdout_force_error"):
         with jax.enable_x64(True):
             power = rows_of(cast(held), cast(model)).power
-        fit["holdout_force_error"] = fit["holdout_force_error"] | {"before": figures.held(model)}
-        fit["filtered_holdout_force_error"] = fit["filtered_holdout_force_error"] | {
-            "before": math.sqrt(power)
-        }
-    return fit
+        errors["holdout_force_error"] = figures.held(model)
+        errors["filtered_holdout_force_error"] = math.sqrt(power)
+    return errors
 
 
-def _findings(looked: Looked) -> list[Finding]:
-    before, after = looked.power
+def _findings(checked: CheckedSimulator) -> list[Finding]:
+    before, after = checked.power
     share = 1 - after / before if before > 0 else 0.0
     found = []
-    for check in looked.checks:
-        if not check.wrong or check.effect not in _EQUATIONS:
+    for check in checked.checks:
+        if not check.wrong or check.effect not in EQUATIONS:
             continue
         value = check.value
         part = share if check.share is None else check.share
         # Where something blocks the axis noise has no say.
-        sure = check.share is not None
-        away = math.inf if sure else abs(float(value.value) / float(value.standard_error))
-        p_value = math.erfc(away / math.sqrt(2))
+        chance = 0.0 if check.share is not None else p_value(value)
         found.append(
             Finding(
-                check.effect, _EQUATIONS[check.effect], f"{check.text} {part:.0%} of the "
+                check.effect, EQUATIONS[check.effect], f"{check.text} {part:.0%} of the "
                 "unexplained force goes with it.", check.confusable, check.separate_by,
-                {check.parameter: value}, part, None, p_value, attribute=check.attribute,
+                {check.parameter: value}, part, None, chance, attribute=check.attribute,
             )
         )  # fmt: skip
     return found
-
-
-_EQUATIONS = {
-    "position_zero": "f(q − z)",
-    "clock": "u(t) = f(t − τ)",
-    "force_limit": "u_real = clip(u, ±U)",
-    END_STOP.name: "x ≤ x_s, or x ≥ x_s",
-}

@@ -1,0 +1,160 @@
+"""A hard limit of force in a log of commands, by a baseline that is fitted to it.
+
+The motion knows nothing of what the command asks for beyond the limit, so that no term of a model
+can say it. The limit is found, the command is cut off there, and all else is looked for in what
+arrived.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ...identification.uncertainty import Estimate
+from ...models import Model
+from .. import parameters as spelled, verification
+from ..baseline import at_values
+from ..evidence import FEWEST_ROWS, Evidence, gather
+from ..explained import Explanation
+from ..figures import Figures
+from ..finding import Finding
+from ..motion import Motion
+from ..nodes import NODES
+from ..predictions import with_predictions
+from ..problem import Problem, with_holdout
+from ..quantities import quantity
+from ..regression import Fit, fit
+from . import limits
+from .preceding import p_value, with_preceding
+from .table import EQUATIONS
+
+# The baseline fitted to all of the command errs by the excess, too, and hides some of it. A cut
+# that takes less than a fifth of that mismatch is none: the fits below are saved.
+SUSPECT = 0.8
+# Of the mean-square mismatch beyond the level, what there may be below, a third in amplitude: what
+# arrives obeys the baseline. Cogging in a slow motion is as much below friction's level as above.
+BELOW = 0.1
+# What is needed beyond the level is one value: it spreads by less than a quarter of what it does
+# below. At a stop, or with a friction that is most of the force, it spreads as much.
+SPREAD = 0.25
+# A machine that is at its limit for most of the time does not do what it is told: the lower part of
+# the commands arrives, and the baseline is fitted to it first.
+ARRIVES, ROUNDS = 1 - limits.MOST, 3
+# A node where the limit is reached holds samples below it too: levels a little higher are tried.
+NEAR = tuple(np.linspace(0.99, 1.05, 13))
+
+
+class Bounded(NamedTuple):
+    """A limit of force, N; the part of the mean-square residual that goes with it; and the baseline
+    of the log as it is, with what it leaves of the force through the kernel, on the held-out
+    recording too.
+    """
+
+    limit: Estimate
+    share: float
+    baseline: Model
+    filtered: float
+    filtered_held: float | None
+
+
+def bounded(
+    motion: Motion, problem: Problem, given: Model | None, held: Motion | None = None
+) -> Bounded | None:
+    """The limit of a log of commands, if there is one.
+
+    `given`: the baseline, where it has values; `held`: the held-out recording.
+
+    At the nodes: the force that the motion needs is compared with the command there.
+    """
+    rows, base = problem.evidence, problem.base
+    moving = np.abs(np.asarray(rows.motion.velocity)) > rows.limits.slowest
+    moving &= np.arange(len(moving)) < rows.nodes
+    command = np.asarray(rows.motion.force, float)[moving]
+    speed = np.asarray(rows.motion.velocity, float)[moving]
+    size, side = np.abs(command), np.sign(command)
+    if limits.cut(size, side * _needed(rows, base)[moving])[1] > SUSPECT:
+        return None
+    level, needed = float(np.quantile(size, ARRIVES)), command
+    for _ in range(ROUNDS):
+        below = _below(rows, level)
+        if len(below.rows) < FEWEST_ROWS:
+            return None
+        needed = side * _needed(rows, fit(base.terms, below, base.betas))[moving]
+        level = limits.cut(size, needed)[0]
+    if not _one_level(size, needed, level):
+        return None
+    limit = limits.limit_of(command, side * needed, speed, motion.recording.unit_names["force"])
+    if limit is None:
+        return None
+    fits = {near: _cut_off(motion, problem, near * float(limit.value)) for near in NEAR}
+    near = min(fits, key=lambda each: fits[each].energy)
+    limit, current = limit._replace(value=near * limit.value), fits[near]
+    if not current.energy < limits.LEAVES_IN_ALL * base.energy:
+        return None
+    first = base if given is None else at_values(given, rows)
+    baseline = spelled.model(first, motion.recording.units)
+    share = 1 - current.energy / base.energy
+    there = None if held is None else with_holdout(problem, held).held
+    filtered = [None if each is None else verification.error(first, each) for each in (rows, there)]
+    return Bounded(limit, share, baseline, *filtered)
+
+
+def _one_level(size: np.ndarray, needed: np.ndarray, level: float) -> bool:
+    """Whether commands below a level arrive, and what is needed beyond it is one value."""
+    beyond = size > level
+    apart = (size - needed) ** 2
+    if np.mean(apart[~beyond]) > BELOW * np.mean(apart[beyond]):
+        return False
+    return bool(np.std(needed[beyond]) < SPREAD * np.std(needed[~beyond]))
+
+
+def _cut_off(motion: Motion, problem: Problem, level: float) -> Fit:
+    """The baseline fitted to the command cut off at a level, N."""
+    arrived = motion.forced(np.clip(np.asarray(motion.recording.force), -level, level))
+    rows = gather(arrived, problem.evidence.width, problem.delay)
+    return fit(problem.base.terms, rows, problem.base.betas)
+
+
+def _below(evidence: Evidence, level: float) -> Evidence:
+    """The rows that hold no command beyond a level, N."""
+    size = np.abs(np.asarray(evidence.motion.force, float))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NODES), 2 * NODES + 1)
+    keep = around.max(axis=1)[evidence.centre] <= level
+    return evidence._replace(
+        rows=evidence.rows[keep], force=evidence.force[keep], target=evidence.target[keep],
+        side=evidence.side[keep], centre=evidence.centre[keep],
+    )  # fmt: skip
+
+
+def _needed(evidence: Evidence, current: Fit) -> np.ndarray:
+    seen = with_predictions(evidence, current)
+    return np.asarray(seen.motion.channels["predicted_force"], float)
+
+
+def with_limit(found: Explanation, bound: Bounded, commanded: Figures) -> Explanation:
+    """An explanation of what arrived, with the limit as its first finding.
+
+    `commanded`: the figures of the log as it is.
+    """
+    text = (
+        f"The actuator gives no more than {quantity(bound.limit)}: beyond it the command asks for "
+        f"what does not arrive. {bound.share:.0%} of the unexplained force goes with it. All else "
+        "is said, and the errors after are taken, of the command cut off there."
+    )
+    limit = Finding(
+        "force_limit", EQUATIONS["force_limit"], text, (), "", {"force_limit": bound.limit},
+        bound.share, None, p_value(bound.limit),
+    )  # fmt: skip
+    before = {
+        "force_error": commanded.here(bound.baseline), "filtered_force_error": bound.filtered,
+    }  # fmt: skip
+    if bound.filtered_held is not None:
+        before["holdout_force_error"] = commanded.held(bound.baseline)
+        before["filtered_holdout_force_error"] = bound.filtered_held
+    found = with_preceding(found, [limit], 1 - bound.share, before)
+    held = found.holdout_model
+    return dataclasses.replace(
+        found,
+        model=found.model.with_force_limit(float(bound.limit.value)),
+        holdout_model=held and held.with_force_limit(float(bound.limit.value)),
+    )

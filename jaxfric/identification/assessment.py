@@ -1,0 +1,171 @@
+"""What is known about parameters that were found: affine ones, deviations, mass, and the result."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from .. import signals
+from ..checks import Design
+from ..terms.base import AbstractTerm, summands
+from ..terms.sample import Scales
+from . import reduced, uncertainty, weighing
+from .identified import Result
+from .projections import Rows
+
+# Samples each way for the mean acceleration: over more of them it lacks some of its peaks, over
+# fewer it is noisier.
+NEAR = 4
+
+
+def solve(term, beta, recording, rows: Rows, alpha=None):
+    """Affine parameters at β, the Jacobian by all parameters, and the residual, unweighted.
+
+    `alpha`: their values, if known.
+    """
+    known = term.with_beta(beta)
+    columns = rows.columns(known, recording)
+    target = rows.target - rows.offset(known, recording)
+    root = reduced.root(rows.positive + rows.negative)
+    alpha = reduced.least_squares(root[:, None] * columns, root * target, alpha)
+    if not term.nonlinear:
+        return alpha, columns, target - columns @ alpha
+
+    def by_beta(beta):
+        return rows.columns(term.with_beta(beta), recording) @ jax.lax.stop_gradient(alpha)
+
+    jacobian = jnp.concatenate([columns, jax.jacfwd(by_beta)(beta)], axis=1)
+    return alpha, jacobian, target - columns @ alpha
+
+
+class Solved(NamedTuple):
+    """Affine parameters of the whole term, deviations of all parameters, the rows of the weak form
+    that they are compared on, and the bias that open ends would leave.
+    """
+
+    alpha: Float[Array, " q"]
+    deviations: uncertainty.Deviations
+    design: Design
+    open_ends: Float[Array, " q"]
+
+
+def solved(
+    known, alpha, jacobian, error, term, recording, limits: Scales, rows: Rows, weak: Rows
+) -> Solved:
+    """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
+    weight = rows.positive + rows.negative
+    place = uncertainty.places(weight)
+    index = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
+    if not index or alpha.size == len(term.affine):
+        left, columns = error, jacobian
+        if weak is not rows:
+            columns = weak.columns(known, recording)
+            left = weak.target - weak.offset(known, recording) - columns @ alpha
+        spread = uncertainty.deviations(jacobian, error, weight, place)
+        design = _design(columns, left, weak)
+        return Solved(alpha, spread, design, jnp.zeros_like(alpha))
+    offset = known.offset(recording)
+    weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
+    # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
+    slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
+    spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
+    pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
+    return Solved(
+        jnp.insert(alpha, index[0], weighed.mass),
+        weighed.beside(spread, index[0]),
+        _design(_inserted(weighed.columns, index[0]), weighed.left, weak),
+        jnp.insert(pull, index[0], 0.0),
+    )
+
+
+def _inserted(columns: Float[Array, "J p"], index: int) -> Float[Array, "J p"]:
+    """Columns of which the first belongs at that index."""
+    others = columns[:, 1:]
+    return jnp.concatenate([others[:, :index], columns[:, :1], others[:, index:]], axis=1)
+
+
+def _design(columns, left, weak: Rows) -> Design:
+    return Design(columns, weak.target, left, weak.positive + weak.negative, weak.time)
+
+
+def unseen(term, active, jacobian, weight) -> Bool[Array, " P"]:
+    """Which parameters, affine ones first, act in no row: zero would be a friction, not a lack.
+
+    A nonlinear one of a direction does not if no affine one of that direction does.
+    """
+    acts = jnp.any((weight > 0)[:, None] & (jacobian != 0), axis=0)
+    own = {p.name: acts[i] for i, p in enumerate(active.affine)}
+    idle = [~own[p.name] if p.name in own else jnp.zeros((), bool) for p in term.affine]
+    for parameter in term.nonlinear:
+        sign = parameter.name[-1]
+        beside = [act for name, act in own.items() if name.endswith(sign)] if sign in "+-" else []
+        idle.append(~jnp.any(jnp.stack(beside)) if beside else jnp.zeros((), bool))
+    return jnp.stack(idle)
+
+
+class Oddities(NamedTuple):
+    """Whether the model explains the force, and whether its inertia and friction are positive."""
+
+    described: Bool[Array, ""]
+    passive: Bool[Array, ""]
+
+
+def passive(term, alpha, matrix, design: Design, weak: Rows, recording) -> Bool[Array, ""]:
+    """Whether neither the inertia nor the friction drives the axis, beyond their intervals.
+
+    Of the friction half the difference of its means forward and backward counts: a constant load,
+    which terms that know the direction take up, cancels. The slower and the faster half of the rows
+    count each, since a line through both may be negative where nothing moved.
+    """
+    bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
+    variance = jnp.diagonal(matrix)
+    inertia = np.array([p.name == "inertia" for p in term.affine], bool)
+    heavy = alpha + bound * jnp.sqrt(variance[: alpha.size]) >= 0
+    passive = jnp.all(heavy | ~inertia)
+    friction = _by_velocity(term)
+    if not friction.any():
+        return passive
+    speed = jnp.abs(weak.project(recording.velocity[:, None])[:, 0])
+    forward, backward = weak.positive > 0, weak.negative > 0
+    middle = jnp.nanmedian(jnp.where(forward | backward, speed, jnp.nan))
+    for half in (speed <= middle, speed > middle):
+        ways = [side & half for side in (forward, backward)]
+        both = jnp.stack(ways).astype(alpha.dtype)
+        count = jnp.sum(both, axis=1)
+        means = both @ design.columns[:, : alpha.size] / jnp.maximum(count, 1)[:, None]
+        share = jnp.where(friction, 0.5 * (means[0] - means[1]), 0.0)
+        own = jnp.where(jnp.isfinite(matrix), matrix, 0.0)[: alpha.size, : alpha.size]
+        error = jnp.sqrt(jnp.maximum(share @ own @ share, 0.0))
+        seen = jnp.all(jnp.isfinite(variance[: alpha.size]) | (share == 0)) & jnp.all(count > 0)
+        passive = passive & (~seen | (share @ alpha + bound * error >= 0))
+    return passive
+
+
+def _by_velocity(term: AbstractTerm) -> np.ndarray:
+    """Which affine parameters are those of functions of the velocity alone, `(p,)`."""
+    leaves = summands(term)
+    own = [leaf.coordinates == {"velocity"} and not leaf.inertial for leaf in leaves]
+    return np.repeat(own, [len(leaf.affine) for leaf in leaves])
+
+
+def outside(rival, beta, matrix) -> Bool[Array, ""]:
+    """Whether a rival minimum lies beyond the 95 % interval of some parameter; not where NaN."""
+    errors = jnp.sqrt(jnp.diagonal(matrix)[matrix.shape[0] - beta.size :])
+    bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
+    return jnp.any(jnp.abs(rival - beta) > bound * errors)
+
+
+def verdict(finite, slipping, closed, hidden, border, converged, ambiguous, odd: Oddities):
+    """The result of an identification: the gravest of what speaks against `successful`."""
+    result = Result.where(converged, Result.successful, Result.not_converged)
+    result = Result.where(ambiguous, Result.ambiguous, result)
+    result = Result.where(border, Result.on_border, result)
+    result = Result.where(odd.passive, result, Result.not_passive)
+    result = Result.where(odd.described, result, Result.not_described)
+    unseen = hidden & (~border | ~odd.described)
+    result = Result.where(unseen, Result.not_excited, result)
+    result = Result.where(closed, result, Result.open_windows)
+    result = Result.where(slipping, result, Result.no_slip)
+    return Result.where(finite, result, Result.not_finite)

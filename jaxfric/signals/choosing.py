@@ -1,0 +1,182 @@
+"""The local polynomial whose derivative of a signal is most accurate, from the signal itself.
+
+On the host, in numpy: done once a recording, nothing is compiled. Inside `jax.jit` the local
+parabola of [`parabolas`][jaxfric.signals.parabolas] takes its place.
+"""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from ..data.excerpt import MOST, cut, excerpt, pieces
+from ..data.recording import Recording
+from .noise import COLOURED
+from .polynomial import BLOCKS, DEGREES, HALF_WIDTHS, WIDE, Choice, weights
+from .sampled import SampledSignal
+
+# The bias of a degree is at most ten times what the next degree takes off it.
+SLOWEST = 0.9
+# The mean squares at neighbouring centres are alike, so that risks are known to a quarter; of those
+# within it the narrowest takes least off the motion.
+ALIKE = 1.25
+# Beyond this the square of a number is none.
+LARGEST = 1e150
+# Centres at least: their mean square is known to a quarter.
+FEWEST = 32
+
+
+class _Level(NamedTuple):
+    """Candidates at common centres: `keys` (degree, half-width in samples), whether each may be
+    chosen, the power of the difference to its pilot, by how much its bias exceeds that difference
+    (zero where the pilot is of the next degree), and what noise of unit variance has of both: |k|²
+    and |k − k_pilot|². All `(C,)`.
+    """
+
+    keys: list[tuple[int, int]]
+    eligible: np.ndarray
+    apart: np.ndarray
+    share: np.ndarray
+    rough: np.ndarray
+    rough_apart: np.ndarray
+
+    def bias(self, noise: float, factor: float) -> np.ndarray:
+        """The squared bias of each, beyond `factor` times the power of the noise, `(C,)`."""
+        shown = np.maximum(self.apart - factor * noise**2 * self.rough_apart, 0.0)
+        share = np.where(self.share > 0, self.share, 1.0)
+        # What the next degree still lacks follows from how quickly the degrees approach: at a
+        # corner of the velocity hardly, and the difference to the next is but a part of the bias.
+        first = np.flatnonzero(self.share == 0)
+        for i, here in enumerate(first):
+            low, high = (here, first[i + 1]) if i + 1 < len(first) else (first[i - 1], here)
+            if low != high and shown[low] > 0:
+                share[here] = 1 / (1 - min(np.sqrt(shown[high] / shown[low]), SLOWEST))
+        return share**2 * shown
+
+
+def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 1) -> Choice:
+    """The local polynomial whose derivative of a signal is most accurate.
+
+    It minimises an estimate of the mean-square error, bias² + σ² |k|², with k the weights and σ the
+    white noise of the signal. The bias of a width shows in the difference to the slope of a pilot
+    of half the width (for the narrowest, of the next degree), less the noise of that difference.
+    What differs between two narrower widths by more than any noise could is bias of every wider
+    one too: two widths that both swallow a motion agree with each other.
+
+    **Arguments:** `signal`, `(N,)`, by default the position; `order` of the derivative, 1 or 2.
+    """
+    whole = np.asarray(recording.position if signal is None else signal)
+    if recording.num_samples > MOST:
+        whole = cut(whole, pieces(np.asarray(recording.mask)))
+        recording = excerpt(recording)
+    log = SampledSignal.of(recording, whole).trimmed()
+    noise = min(log.noise(), LARGEST)
+    tried: list[tuple[float, float, int, int]] = []
+    least = dict.fromkeys(DEGREES, 0.0)  # of the bias² of wider candidates, by degree
+    for block, widths in _ladder(log.longest):
+        level = _level(log, block, widths, order)
+        if level is None:
+            continue
+        own, sure = (level.bias(noise, factor) for factor in (1.0, COLOURED))
+        for i, (degree, width) in enumerate(level.keys):
+            if not level.eligible[i]:
+                continue
+            bias = max(own[i], least[degree])
+            least[degree] = max(least[degree], sure[i])
+            tried.append((bias + noise**2 * level.rough[i], bias, degree, width))
+    if not tried:
+        return Choice(DEGREES[0], HALF_WIDTHS[0], noise=noise)
+    risk = min(tried)[0]
+    narrow = min(trial[3] for trial in tried if trial[0] <= ALIKE * risk)
+    risk, bias, degree, width = min(trial for trial in tried if trial[3] == narrow)
+    scale = log.step**order
+    return Choice(degree, width, float(np.sqrt(risk)) / scale, float(np.sqrt(bias)) / scale, noise)
+
+
+def _ladder(longest: int) -> list[tuple[int, list[int]]]:
+    """Blocks, and half-widths in blocks, for a run of so many samples: an eighth of it at most."""
+    most = max(HALF_WIDTHS[0], longest // 8)
+    levels = [(1, [k for k in HALF_WIDTHS if k <= most])]
+    levels += [(b, [k for k in (64, 96, *WIDE) if k * b <= most]) for b in BLOCKS]
+    return [(b, ks) for b, ks in levels if b == 1 or len(ks) > 2]
+
+
+class _Shapes(NamedTuple):
+    """The weights of candidates on an even clock, and what follows from them alone.
+
+    `shapes`, `(K, C)`; `pilot`, the index of each one's pilot; the others as in [`_Level`][].
+    """
+
+    keys: list[tuple[int, int]]
+    shapes: np.ndarray
+    pilot: np.ndarray
+    share: np.ndarray
+    rough: np.ndarray
+    apart: np.ndarray
+
+
+@lru_cache(maxsize=64)
+def _shapes(widths: tuple[int, ...], order: int) -> _Shapes:
+    keys = [(d, k) for d in (*DEGREES, DEGREES[-1] + 2) for k in widths if 2 * k >= d]
+    shapes = np.stack([weights(k, d, order, max(widths)) for d, k in keys], axis=1)
+    moments = [_moment(shape, d, order) for shape, (d, _) in zip(shapes.T, keys, strict=True)]
+    pilot = np.array([_pilot(key, keys) for key in keys])
+    same = np.array([keys[p][0] == d for p, (d, _) in zip(pilot, keys, strict=True)])
+    ratio = np.abs(np.array(moments)[pilot] / np.array(moments))
+    share = np.where(same & (ratio < 1), 1 / (1 - np.where(ratio < 1, ratio, 0.0)), 0.0)
+    rough, apart = np.sum(shapes**2, axis=0), np.sum((shapes - shapes[:, pilot]) ** 2, axis=0)
+    return _Shapes(keys, shapes, pilot, share, rough, apart)
+
+
+def _level(log: SampledSignal, block: int, widths: list[int], order: int) -> _Level | None:
+    """The candidates of one block size, `None` where no window of the widest is whole."""
+    fitting = _fitting(log, block, widths)
+    uneven = not fitting
+    if block > 1 and not set(fitting) & set(WIDE):
+        return None
+    widths = fitting or widths
+    keys, shapes, pilot, share, rough, apart = _shapes(tuple(widths), order)
+    reach = max(widths)
+    if not uneven:
+        centres = log.centres(block * reach + block // 2)
+        slopes = log.windows(centres, block, reach) @ shapes
+        # A block's mean has less noise.
+        rough, apart = rough / block, apart / block
+    else:
+        found = log.exact_slopes(keys, reach, order)
+        if found is None:
+            return None
+        slopes, rough, apart = found[0], found[1], found[2](pilot)
+    power = np.mean((slopes - slopes[:, pilot]) ** 2, axis=0)
+    scale = block**order
+    offered = np.array([d <= DEGREES[-1] and (block == 1 or k >= WIDE[0]) for d, k in keys])
+    return _Level(
+        [(d, k * block) for d, k in keys],
+        offered, power / scale**2, share, rough / scale**2, apart / scale**2,
+    )  # fmt: skip
+
+
+def _fitting(log: SampledSignal, block: int, widths: list[int]) -> list[int]:
+    """Those of the widths that most samples have all their neighbours for, between the gaps."""
+    half = np.count_nonzero(log.valid) // 2
+    for count in range(len(widths), 0, -1):
+        reach = block * widths[count - 1] + block // 2
+        if len(log.whole(reach)) >= half and len(log.centres(reach)) >= FEWEST:
+            return widths[:count]
+    return []
+
+
+def _moment(shape: np.ndarray, degree: int, order: int) -> float:
+    """The lowest moment that the weights of that degree do not annul: that of their bias."""
+    offset = np.arange(len(shape)) - len(shape) // 2
+    return float(shape @ (offset / (len(shape) // 2)) ** (degree + order))
+
+
+def _pilot(key: tuple[int, int], keys: list[tuple[int, int]]) -> int:
+    """The candidate by which the bias of another shows: half as wide, or of the next degree."""
+    degree, width = key
+    half = [k for d, k in keys if d == degree and 2 * k <= width]
+    if half:
+        return keys.index((degree, max(half)))
+    above = [k for d, k in keys if d == degree + 2]
+    return keys.index((degree + 2, min(above))) if above else keys.index(key)
