@@ -108,5 +108,5 @@ class Figures:
         if not apart.size:
             return float("nan")
         noise = float(np.median(apart)) / 0.6745 / np.sqrt(2)
-        both = noise, np.sqrt(np.mean(rest[moving] ** 2))  # noise is no more than all of it
-        return relative(np.full(int(moving.sum()), min(both)), force[moving])
+        alone = relative(np.full(int(moving.sum()), noise), force[moving])
+        return min(alone, relative(rest[moving], force[moving]))  # noise is no more than all of it
