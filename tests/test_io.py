@@ -261,6 +261,14 @@ def test_milliseconds_in_a_name_are_taken_as_such(tmp_path):
     np.testing.assert_allclose(io.read(path, scale={"time": 1.0}).time, 1000 * columns["time"])
 
 
+@pytest.mark.parametrize("unit", ["35.15*N", "35.15 N", "35.15·N"])
+def test_a_factor_in_a_unit_is_told_to_be_a_scale(tmp_path, unit):
+    path = save(tmp_path / "log.csv", log())
+    with pytest.raises(ValueError, match=r"--scale force=35\.15 --units force=N "):
+        io.read(path, units={"force": unit})
+    assert io.read(path, units={"force": "1"}).unit_names["force"] == "1"
+
+
 def test_time_stamps_since_1970_are_what_they_are_beside_a_unit(tmp_path):
     columns = log()
     stamps = 1_700_000_000_000 + np.rint(1000 * columns["time"]).astype(int)

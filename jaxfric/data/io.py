@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -166,6 +167,13 @@ def _check_arguments(chosen, scale, units, period, source) -> None:
             f"{source}: units names {', '.join(sorted(unknown))}; only the force and the position "
             "have a unit to name, the others follow from them and the second."
         )
+    for role, unit in units.items():
+        if number := re.match(r"(\d*\.?\d+(?:[eE][+-]?\d+)?)[*·× ]?(?=[^\s/.])", unit):
+            raise ValueError(
+                f"{source}: the unit of {role} is {unit!r}. A unit is a name and converts nothing; "
+                f"a factor is a scale: --scale {role}={number[1]} "
+                f"--units {role}={unit[number.end() :]} (scale=, units= in Python)."
+            )
 
 
 def _time(table: Table, chosen, scale, path: Path) -> tuple[np.ndarray, list[str], bool]:
