@@ -173,7 +173,7 @@ def outcome(kind: str, joint: str, truth: float, found) -> str:
         return "declared" if len(finding.parameters) == 1 and name in near else "beside"
     (value,) = finding.parameters.values()
     away, moved = abs(float(value.value) - truth), abs(truth - value.before)
-    return "right" if away <= 2.5 * float(value.standard_error) + 0.02 * moved else "biased"
+    return "right" if away <= float(value.half_width()) + 0.02 * moved else "biased"
 
 
 if __name__ == "__main__":

@@ -65,8 +65,8 @@ def main() -> None:
         for kind, outcome, text, ratio, away in case(arguments.seed, number):
             tally[kind][outcome] += 1
             if away is not None:
-                inside[away <= 1.96] += 1
-                text += f"; {away:.1f} standard errors from the truth"
+                inside[away <= 1] += 1
+                text += f"; {away:.1f} half intervals from the truth"
             if kind != "nothing":
                 again["no" if ratio is None else "near" if abs(ratio - 1) <= NEAR else "off"] += 1
                 text += "; not run again" if ratio is None else f"; tracking error × {ratio:.2f}"
@@ -251,12 +251,12 @@ def truth_of(kind: str, plant: dict, extra: dict) -> float:
 
 
 def distance(kind: str, plant: dict, extra: dict, found) -> float | None:
-    """By how many standard errors a value that was found is off; `None` where it was not found."""
+    """By how many halves of its interval a value is off; `None` where it was not found."""
     for finding in found.findings:
         if VALUES[kind] in finding.parameters:
             value = finding.parameters[VALUES[kind]]
             away = abs(float(value.value) - truth_of(kind, plant, extra))
-            return away / float(value.standard_error)
+            return away / float(value.half_width())
     return None
 
 
@@ -275,7 +275,7 @@ def _valued(name: str, truth: float, effects: set, found) -> str:
     (value,) = finding.parameters.values()
     away = abs(float(value.value) - truth)
     moved = abs(truth - value.before)
-    return "right" if away <= 2.5 * float(value.standard_error) + 0.02 * moved else "biased"
+    return "right" if away <= float(value.half_width()) + 0.02 * moved else "biased"
 
 
 def said(found) -> str:

@@ -66,7 +66,7 @@ def ripple(found):
     if not waves:
         return "cogging", "ripple", "2.5 mm expected", "**not named**"
     pitch, size = (waves[0].parameters[name] for name in ("pitch", "amplitude"))
-    text = f"{1e3 * float(pitch.value):.4f} ± {2e3 * float(pitch.standard_error):.4f} mm, "
+    text = f"{1e3 * float(pitch.value):.4f} ± {1e3 * float(pitch.half_width()):.4f} mm, "
     text += f"{float(size.value):.2f} N; share held out {waves[0].holdout_share or 0:.0%}"
     return "cogging", "ripple", "2.5 mm expected", text
 

@@ -9,6 +9,7 @@ import jaxfric as jf
 from jaxfric import cli
 from jaxfric.explanation import attributes
 from jaxfric.explanation.finding import Finding, Moved
+from jaxfric.identification.uncertainty import Estimate
 from jaxfric.simulators import Mujoco, closed
 from jaxfric.simulators.inverse import Motion
 from jaxfric.simulators.patching import patched
@@ -184,7 +185,7 @@ def test_the_loop_over_the_models_actuator_repeats_the_recording():
 
 def test_a_constant_force_without_an_attribute_says_what_it_may_be():
     own = Mujoco(motor(), "hip").attributes()
-    moved = {"offset": Moved(0.0, np.float64(0.4), np.float64(0.01), "N·m")}
+    moved = {"offset": Moved(0.0, Estimate(np.float64(0.4), np.float64(0.01), "N·m"))}
     finding = Finding("parameter_mismatch", "", "", (), "", moved, 0.9, None, 0.002)
     said = attributes._reworded(finding, own)
     assert attributes.MAY_BE in said.sentence and said.attribute is None

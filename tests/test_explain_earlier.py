@@ -12,6 +12,7 @@ from jaxfric.cli import main
 from jaxfric.explanation import Earlier, explain
 from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.sentences import changed_sentence, parameter
+from jaxfric.identification.uncertainty import Estimate
 
 from .test_cli import write_axis
 from .test_explain import healthy as healthy, planted
@@ -62,12 +63,12 @@ def test_another_homing_is_no_change(healthy):
 
 def test_the_sentence_has_both_values_and_the_error_of_the_change():
     moved = {
-        "coulomb+": Moved(20.1, 22.3, 0.08, "N", 0.06),
-        "viscous-": Moved(240.0, 201.0, 4.0, "N·s/m", 3.0),
+        "coulomb+": Moved(20.1, Estimate(22.3, 0.08, "N"), 0.06),
+        "viscous-": Moved(240.0, Estimate(201.0, 4.0, "N·s/m"), 3.0),
     }
     assert changed_sentence(moved, 0.71, "old.csv") == (
-        "Coulomb friction forwards rose from 20.10 to 22.30 N (± 0.20), viscous friction backwards "
-        "fell from 240 to 201 N·s/m (± 10) since old.csv; 71% of the difference."
+        "Coulomb friction forwards rose from 20.10 to 22.30 N (± 0.23), viscous friction backwards "
+        "fell from 240 to 201 N·s/m (± 12) since old.csv; 71% of the difference."
     )
     assert parameter("inertia") == "inertia" and parameter("coulomb") == "Coulomb friction"
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from jaxfric.cli import main
+from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effects import effect
 from jaxfric.validation import proof
 from jaxfric.validation.concealed import OUTSIDE, names
@@ -30,8 +31,7 @@ def sealed(**truth):
 
 def finding(name, *alike, **parameters):
     values = {
-        key: {"value": value, "standard_error": error, "unit": "N"}
-        for key, (value, error) in parameters.items()
+        key: Estimate(value, error, "N").to_dict() for key, (value, error) in parameters.items()
     }
     return {"effect": name, "confusable_with": list(alike), "parameters": values}
 

@@ -12,7 +12,8 @@ from jaxfric.terms.effect import Extent
 
 
 def estimate(value, error, unit):
-    return Estimate(np.float64(value), np.float64(error), unit)
+    """With so many degrees of freedom that half the interval is two standard errors."""
+    return Estimate(np.float64(value), np.float64(error), unit, 60)
 
 
 @pytest.mark.parametrize(

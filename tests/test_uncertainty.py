@@ -1,6 +1,7 @@
 """Do the nominal 95 % intervals hold the truth 95 times of 100?"""
 
 import math
+import types
 
 import jax
 import jax.numpy as jnp
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.explanation import intervals
 from jaxfric.identification import uncertainty
 from jaxfric.identification.identified import result_names
 
@@ -156,6 +158,60 @@ def test_the_sandwich_of_white_noise_is_the_classical_covariance():
     np.testing.assert_allclose(np.mean(draws, axis=0), classical, rtol=0.16)
 
 
-@pytest.mark.parametrize(("degrees", "expected"), [(5, 2.5706), (10, 2.2281), (28, 2.0484)])
+@pytest.mark.parametrize(
+    ("degrees", "expected"), [(3, 3.1824), (5, 2.5706), (10, 2.2281), (28, 2.0484)]
+)
 def test_student_quantile(degrees, expected):
-    np.testing.assert_allclose(uncertainty.student_quantile(0.975, degrees), expected, rtol=3e-3)
+    np.testing.assert_allclose(uncertainty.student_quantile(0.975, degrees), expected, rtol=5e-3)
+
+
+def test_an_estimate_as_plain_data_has_its_interval():
+    seen = uncertainty.Estimate(np.float64(2.0), np.float64(0.1), "N")
+    low, high = seen.to_dict()["interval"]
+    assert (low + high) / 2 == pytest.approx(2.0) and high - 2.0 == pytest.approx(0.2306, rel=1e-3)
+    assert seen.half_width() == pytest.approx(0.2306, rel=1e-3)
+    hidden = seen._replace(standard_error=np.inf).to_dict()
+    assert hidden == {"value": 2.0, "standard_error": None, "interval": None, "unit": "N"}
+
+
+def in_blocks(filled, seed, draws=1500, blocks=24, rows=20):
+    """Which draws of the noise leave the truth in the interval, and how wide two standard errors
+    would: of a column that fills so many blocks, beside three that fill all.
+    """
+    rng = np.random.default_rng(seed)
+    block = np.repeat(np.arange(blocks), rows)
+    columns = rng.normal(size=(block.size, 4))
+    columns[:, 0] *= np.isin(block, rng.choice(blocks, filled, replace=False))
+    inverse, held = np.linalg.pinv(columns), []
+    for _ in range(draws):
+        noise = rng.normal(size=block.size)
+        found = inverse @ noise
+        fit = types.SimpleNamespace(jacobian=columns, residual=noise - columns @ found)
+        known = intervals.spread(fit, block)
+        half = known.half_widths(np.eye(4))[0]
+        held.append((abs(found[0]) <= half, abs(found[0]) <= 2 * known.covariance[0, 0] ** 0.5))
+    return np.mean(held, axis=0)
+
+
+@pytest.mark.parametrize("filled", [1, 2, 3, 6, 24])
+def test_intervals_of_what_few_blocks_hold_are_wider(filled):
+    """Satterthwaite's degrees of freedom: as many as there are blocks that tell.
+
+    Of two blocks one tells the negative of the other: with one degree the interval would be 12.7
+    standard errors, and it is 4.3.
+    """
+    by_degrees, by_two = in_blocks(filled, 7)
+    assert (0.87 if filled == 2 else 0.935) < by_degrees < 0.99
+    assert by_two < by_degrees and (filled not in (2, 3) or by_two < 0.9)
+
+
+def test_degrees_of_freedom_follow_the_blocks_that_tell():
+    rng = np.random.default_rng(3)
+    block = np.repeat(np.arange(24), 20)
+    columns = rng.normal(size=(block.size, 3))
+    columns[block > 0, 0] = 0.0
+    columns[block > 7, 1] = 0.0
+    fit = types.SimpleNamespace(jacobian=columns, residual=rng.normal(size=block.size))
+    one, eight, all_ = intervals.spread(fit, block).degrees_of_freedom(np.eye(3))
+    # What one block holds is judged by the noise of all.
+    assert 18 < one < 26 and 5 < eight < 8 and 18 < all_ < 24

@@ -82,12 +82,16 @@ def _attributes(moved: Mapping[str, Moved], own: Mapping[str, Attribute]) -> dic
             # A gain of less force for each command, where more of it is recorded.
             value = before * times if own[GAIN].what == GAIN else before / times
             error = float(m.standard_error) * abs(value / times)
-            found[_gear(own)] = Moved(before, np.float64(value), error, own[GAIN].unit)
+            now = m.estimate._replace(
+                value=np.float64(value), standard_error=error, unit=own[GAIN].unit
+            )
+            found[_gear(own)] = Moved(before, now)
         elif name in own:
             before = own[name].value
             # What a command does between its samples is anywhere within one of them.
             error = np.hypot(m.standard_error, own[name].between / np.sqrt(12))
-            found[name] = Moved(before, np.float64(before + m.value), error, m.unit)
+            value = np.float64(before + m.value)
+            found[name] = Moved(before, m.estimate._replace(value=value, standard_error=error))
         else:
             found[name] = m
     return _sprung(found, own)
@@ -136,14 +140,13 @@ def _sprung(found: dict[str, Moved], own: Mapping[str, Attribute]) -> dict[str, 
     before, constant = own[name].rest, found[CONSTANT]
     if not stiffness > 0:
         return found
-    reference = Moved(
-        before,
-        np.float64(before - float(constant.value) / stiffness),
-        float(constant.standard_error) / stiffness,
-        "rad" if "rad" in own[name].unit else "m",
+    reference = constant.estimate._replace(
+        value=np.float64(before - float(constant.value) / stiffness),
+        standard_error=float(constant.standard_error) / stiffness,
+        unit="rad" if "rad" in own[name].unit else "m",
     )
     others = {key: m for key, m in found.items() if key != CONSTANT}
-    return others | {name.replace(STIFFNESS, REFERENCE): reference}
+    return others | {name.replace(STIFFNESS, REFERENCE): Moved(before, reference)}
 
 
 # What a joint calls the parameters of laws that may change at a moment.
@@ -164,10 +167,11 @@ def _stepped(finding: Finding, own: Mapping[str, Attribute], now: Mapping[str, f
     if key is None or not isinstance(change, Estimate) or not isinstance(moment_, Estimate):
         return finding
     before, attribute = now[key], own[key]
-    moved = Moved(before, np.float64(before + change.value), change.standard_error, attribute.unit)
+    after = change._replace(value=np.float64(before + change.value), unit=attribute.unit)
+    moved = Moved(before, after)
     keys = {n: _attribute_of(n, own) or n for others in finding.instead.values() for n in others}
     instead = {key: tuple(keys.values())} if keys else {}
-    value = quantity(Estimate(moved.value, moved.standard_error, moved.unit), smaller=False)
+    value = quantity(after, smaller=False)
     reason = finding.sentence.partition(";")[0].partition(": ")[2]
     text = (
         f"At t = {quantity(moment_)} {attribute.owner}'s {attribute.what} changes from "
@@ -190,12 +194,11 @@ def _attribute_of(name: str, own: Mapping[str, Attribute]) -> str | None:
 
 def _text(name: str, m: Moved, own: Mapping[str, Attribute]) -> str:
     """One wrong value: "joint elbow: damping 0.5 → 1.10 N·m·s/rad ± 0.02 N·m·s/rad"."""
-    value = Estimate(m.value, m.standard_error, "" if m.unit == "1" else m.unit)
-    said = quantity(value, smaller=name == CONSTANT)
+    said = quantity(m.estimate, smaller=name == CONSTANT)
     if name == CONSTANT:
         return f"a constant force of {said}, for which it has no attribute (it may be {MAY_BE})"
     if name == GAIN:
-        size = quantity(Estimate(abs(m.value), m.standard_error, ""))
+        size = quantity(m.estimate._replace(value=abs(m.value), unit=""))
         if m.value < 0:
             return (
                 f"the recorded force is counted the other way, and is {size} times the "

@@ -10,7 +10,7 @@ from ..identification.uncertainty import Estimate
 from ..terms.base import summands
 from ..units import VELOCITY, spell
 from .evidence import Evidence
-from .intervals import covariance
+from .intervals import spread
 from .nodes import NODES
 from .problem import Problem
 from .quantities import quantity, rise
@@ -20,8 +20,6 @@ from .regression import Fit
 NOT_BETTER = "not_better"
 # One by which nothing at reversals was judged.
 CREEPS = "creeps"
-# Standard errors in half a 95 % interval, as in the findings' sentences.
-HALF_WIDTH = 2.0
 # More than half of the force's power: the model is further from the force than no force at all is
 # from what it leaves.
 UNDESCRIBED = 0.5
@@ -37,7 +35,7 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     index = _friction(current)
     if not index:
         return False
-    matrix = covariance(current, block)
+    known = spread(current, block)
     speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])
     slow = speed <= np.median(speed)
     alpha = np.concatenate(current.alphas)
@@ -45,15 +43,11 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
         forward, backward = half & (evidence.side > 0), half & (evidence.side < 0)
         if not (forward.any() and backward.any()):
             continue
-        weights = np.zeros(len(matrix))
+        weights = np.zeros(len(known.covariance))
         columns = current.columns[:, index]
         weights[index] = (columns[forward].mean(axis=0) - columns[backward].mean(axis=0)) / 2
-        seen = np.flatnonzero(weights)
-        spread = matrix[np.ix_(seen, seen)]
-        if not np.isfinite(spread).all():  # what is not visible may be anything
-            continue
-        error = np.sqrt(max(float(weights[seen] @ spread @ weights[seen]), 0.0))
-        if weights[: len(alpha)] @ alpha < -HALF_WIDTH * error:
+        # What is not visible may be anything.
+        if weights[: len(alpha)] @ alpha < -known.half_widths(weights[None])[0]:
             return True
     return False
 
@@ -74,7 +68,7 @@ def accelerates(parameters: dict[str, Estimate]) -> bool:
     inertia = parameters.get("inertia")
     if inertia is None or not np.isfinite(inertia.standard_error):
         return False
-    return float(inertia.value) < -HALF_WIDTH * float(inertia.standard_error)
+    return bool(inertia.interval()[1] < 0)
 
 
 def _corrects(evidence: Evidence) -> bool:

@@ -5,20 +5,57 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..identification.uncertainty import Estimate
 
 
 class Moved(NamedTuple):
-    """A parameter of the baseline whose value is wrong: before, after, standard error, unit.
+    """A parameter of the baseline whose value is wrong: before, and as estimated.
 
     `before_error`: the standard error of the value before, where that is known.
     """
 
     before: float
-    value: Any
-    standard_error: Any
-    unit: str
+    estimate: Estimate
     before_error: float = 0.0
+
+    @property
+    def value(self) -> Any:
+        """The value that it has."""
+        return self.estimate.value
+
+    @property
+    def standard_error(self) -> Any:
+        """The standard error of that value."""
+        return self.estimate.standard_error
+
+    @property
+    def unit(self) -> str:
+        """The unit of both values."""
+        return self.estimate.unit
+
+    def half_width(self, level: float = 0.95) -> Any:
+        """Half the confidence interval of the value that it has."""
+        return self.estimate.half_width(level)
+
+    def interval(self, level: float = 0.95) -> tuple[Any, Any]:
+        """The confidence interval of the value that it has."""
+        return self.estimate.interval(level)
+
+    @property
+    def change(self) -> Estimate:
+        """What the value is more than before, with the error of both."""
+        error = math.hypot(float(self.standard_error), self.before_error)
+        more = self.value - self.before
+        return self.estimate._replace(value=more, standard_error=np.float64(error))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Both values as plain data; the error before where it is known."""
+        now = self.estimate.to_dict()
+        moved = {"from": float(self.before), "to": now.pop("value"), **now}
+        own = float(self.before_error)
+        return moved | ({"from_standard_error": own} if 0 < own < math.inf else {})
 
 
 class Finding(NamedTuple):
@@ -62,15 +99,4 @@ def findings_document(findings: Sequence[Finding]) -> list[dict[str, Any]]:
 
 def estimates_document(parameters: Mapping[str, Estimate | Moved]) -> dict[str, Any]:
     """Parameters as plain data."""
-    return {name: _estimate(estimate) for name, estimate in parameters.items()}
-
-
-def _estimate(estimate: Estimate | Moved) -> dict[str, Any]:
-    error = float(estimate.standard_error)
-    rest = {"standard_error": error if math.isfinite(error) else None, "unit": estimate.unit}
-    if isinstance(estimate, Moved):
-        moved = {"from": float(estimate.before), "to": float(estimate.value), **rest}
-        own = float(estimate.before_error)
-        return moved | ({"from_standard_error": own} if 0 < own < math.inf else {})
-    value = float(estimate.value)
-    return {"value": value if math.isfinite(value) else None, **rest}
+    return {name: estimate.to_dict() for name, estimate in parameters.items()}

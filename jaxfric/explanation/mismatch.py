@@ -107,8 +107,6 @@ def _lasting(
 
 # What half of all parameters would do as well says nothing of any of them.
 VAGUE = 0.5
-# Half a 95 % interval in standard errors.
-HALF_WIDTH = 2.0
 
 
 def _different(
@@ -126,11 +124,11 @@ def _different(
         before = [*model.alpha, *model.term.beta()]
         away = {
             i: abs(float(values[names[i]].value) - float(before[i]))
-            / float(values[names[i]].standard_error)
+            / float(values[names[i]].half_width())
             for i in free
         }
         least = min(away, key=lambda i: away[i])
-        if away[least] > HALF_WIDTH:
+        if away[least] > 1:
             break
         free = [i for i in free if i != least]
     return free

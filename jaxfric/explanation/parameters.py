@@ -11,7 +11,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
 from ..units import spell
-from .intervals import covariance
+from .intervals import spread
 from .regression import Fit
 
 
@@ -31,8 +31,8 @@ def model(current: Fit, units) -> Model:
 
 def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
     """The parameters of each term of a fit, waves by amplitude and phase too."""
-    matrix = covariance(current, block)
-    freedom = max(int(block[-1]) + 1 - matrix.shape[0] // 2, 3)
+    known = spread(current, block)
+    matrix, freedom = known.covariance, known.degrees_of_freedom(np.eye(len(known.covariance)))
     result = []
     for n, term in enumerate(current.terms):
         index = current.indices(n)
@@ -42,11 +42,11 @@ def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[di
                 np.float64(value),
                 np.float64(np.sqrt(matrix[i, i])),
                 spell(p.dimension, units),
-                freedom,
+                float(freedom[i]),
             )
             for p, value, i in zip((*term.affine, *term.nonlinear), values, index, strict=True)
         }
-        result.append(plain | _waves(term, values, matrix[np.ix_(index, index)], plain, freedom))
+        result.append(plain | _waves(term, values, matrix[np.ix_(index, index)], plain))
     return result
 
 
@@ -78,7 +78,7 @@ def may_be_none(
 _wave = programs.compiled(wave)
 
 
-def _waves(term, values, matrix, plain, freedom) -> dict[str, Estimate]:
+def _waves(term, values, matrix, plain) -> dict[str, Estimate]:
     """Amplitude and phase of every pair of sine and cosine."""
     found = {}
     names = [p.name for p in term.affine]
@@ -89,6 +89,7 @@ def _waves(term, values, matrix, plain, freedom) -> dict[str, Estimate]:
         suffix = f"_harmonic{harmonic}" if harmonic else ""
         pair = _wave(*map(np.asarray, values[i : i + 2]), matrix[i : i + 2, i : i + 2])
         unit, pair = plain[name].unit, Wave(*map(np.asarray, pair))
+        freedom = min(plain[n].degrees_of_freedom for n in names[i : i + 2])
         found[f"amplitude{suffix}"] = Estimate(pair.amplitude, pair.amplitude_error, unit, freedom)
         found[f"phase{suffix}"] = Estimate(pair.phase, pair.phase_error, "rad", freedom)
     return found

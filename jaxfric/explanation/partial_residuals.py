@@ -14,14 +14,11 @@ from . import verification
 from .bins import Axis, Bins, axis
 from .evidence import Evidence
 from .improvement import Improved
-from .intervals import covariance
+from .intervals import spread
 from .locate import coordinates
 from .mismatch import Mismatch
 from .predictions import with_predictions
 from .regression import Fit
-
-# Half a 95 % interval in standard errors, as in the findings' sentences.
-HALF_WIDTH = 2.0
 
 
 def partial_residuals(better: Improved) -> list[dict[str, Any]]:
@@ -36,11 +33,11 @@ def partial_residuals(better: Improved) -> list[dict[str, Any]]:
         current, index = selection.last, selection.term_index(number)
         seen = with_predictions(problem.evidence, current)
         law = current.part(index)
-        slopes, spread = _parameters(current, index, problem.block)
         along = _along(selected.effect.name, current, index, seen)
         before = verification.residual(better.first, problem.evidence)
         pictures.append(
-            _picture(along, law, current.residual, before) | _band(along, law, slopes, spread)
+            _picture(along, law, current.residual, before)
+            | _band(along, law, current, index, problem.block)
         )
     return pictures
 
@@ -72,21 +69,17 @@ def _picture(along: Axis, law, residual, before) -> dict[str, Any]:
     }
 
 
-def _band(along: Axis, law, slopes: np.ndarray, spread: np.ndarray) -> dict[str, Any]:
-    """The law's 95 % band, by the covariance of its parameters; none where one is not seen."""
-    if not np.all(np.isfinite(spread)):
+def _band(along: Axis, law, current: Fit, index: int, block: np.ndarray) -> dict[str, Any]:
+    """The law's 95 % band, by its term's parameters; none where one is not seen."""
+    bins, own = Bins(along), current.indices(index)
+    gradient = np.stack([bins.mean(column) for column in current.jacobian[:, own].T], axis=1)
+    weights = np.zeros((len(gradient), current.jacobian.shape[1]))
+    weights[:, own] = gradient
+    half = spread(current, block).half_widths(weights)
+    if not np.all(np.isfinite(half)):
         return {}
-    bins = Bins(along)
-    gradient = np.stack([bins.mean(column) for column in slopes.T], axis=1)
-    half = HALF_WIDTH * np.sqrt(np.maximum(np.sum(gradient @ spread * gradient, axis=1), 0.0))
     middle = bins.mean(law)
     return {"low": (middle - half).tolist(), "high": (middle + half).tolist()}
-
-
-def _parameters(current: Fit, index: int, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The derivatives of the force by one term's parameters, `(J, k)`, and their covariance."""
-    own = current.indices(index)
-    return current.jacobian[:, own], covariance(current, block)[np.ix_(own, own)]
 
 
 def _along(effect: str, current: Fit, index: int, seen: Evidence) -> Axis:

@@ -25,13 +25,12 @@ def quantity(estimate: Estimate, smaller: bool = True) -> str:
     value, error = float(estimate.value), float(estimate.standard_error)
     if math.isinf(error):  # the data cannot see it, and its value is any
         return "an amount that this recording cannot tell"
-    size = max(abs(value), 2 * error if error > 0 else 0.0)
-    name, scale = _unit(estimate.unit, size if smaller else 1.0)
-    value, error = value / scale, error / scale
+    half = float(estimate.half_width()) if error > 0 else 0.0
+    name, scale = _unit(estimate.unit, max(abs(value), half) if smaller else 1.0)
+    value, half = value / scale, half / scale
     unit = f" {name}" if name not in ("", "1") else ""
-    if not error > 0:
+    if not half > 0:
         return f"{value:.3g}{unit}"
-    half = 2 * error
     digits = max(0, 1 - math.floor(math.log10(half)))
     if abs(value) >= 1e5 or 0 < abs(value) < 1e-3:
         return f"{value:.3g}{unit} ± {half:.1g}{unit}"
@@ -52,17 +51,17 @@ def _unit(unit: str, size: float) -> tuple[str, float]:
 
 def nil(estimate: Estimate) -> bool:
     """Whether a size may be nil: it is no larger than half its interval, as they are written."""
-    value, half = abs(float(estimate.value)), 2 * float(estimate.standard_error)
+    value, half = abs(float(estimate.value)), float(estimate.half_width())
     return 0 < half < math.inf and value <= 1.05 * half
 
 
 def per_pole_pair(period: Estimate, pairs: int) -> str:
     """How often a period of an angle goes into a pole pair: " That is 6 times per pole pair."."""
     turn = TURNS.get(period.unit)
-    value, error = float(period.value), float(period.standard_error)
+    value, error = float(period.value), float(period.half_width())
     if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
         return ""
-    count, half = turn / value / pairs, 2 * turn * error / value**2 / pairs
+    count, half = turn / value / pairs, turn * error / value**2 / pairs
     whole = round(count)
     if whole and abs(count - whole) <= max(half, 0.01 * whole):
         return f" That is {'once' if whole == 1 else f'{whole} times'} per pole pair."
@@ -72,10 +71,10 @@ def per_pole_pair(period: Estimate, pairs: int) -> str:
 def turns(period: Estimate) -> str:
     """How often a period of an angle goes into a revolution: " (5 times per revolution)"."""
     turn = TURNS.get(period.unit)
-    value, error = float(period.value), float(period.standard_error)
+    value, error = float(period.value), float(period.half_width())
     if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
         return ""
-    count, half = turn / value, 2 * turn * error / value**2
+    count, half = turn / value, turn * error / value**2
     whole = round(count)
     # A wave of the motor or its gear goes a whole number of times into a revolution.
     if whole and abs(count - whole) <= max(half, 0.01 * whole):

@@ -101,9 +101,7 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
     for i, before in wrong.moved.items():
         current = values[names[i]]
         if i not in wrong.within:
-            moved[names[i]] = Moved(
-                before, current.value, current.standard_error, current.unit, float(errors[i])
-            )
+            moved[names[i]] = Moved(before, current, float(errors[i]))
     first = better.first
     held_share = None if held is None else verification.share(first, base, first, held)
     text = mismatch_sentence(moved, wrong.share, wrong.rivals)

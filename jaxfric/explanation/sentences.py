@@ -43,7 +43,7 @@ def indistinct(rivals: Sequence[str]) -> str:
 
 def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     """A value in words; of a size that may be nil the most that it may be."""
-    most = float(estimate.value) + 2 * float(estimate.standard_error)
+    most = float(estimate.interval()[1])
     if name.startswith(effect.sizes) and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
     if name in effect.periods:
@@ -56,12 +56,11 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
     parts = []
     for name, m in moved.items():
         if name == GAIN and not m.before:
-            parts.append(_times(1 + float(m.value), float(m.standard_error)))
+            parts.append(_times(m.estimate._replace(value=1 + m.value)))
         elif m.before:
-            value = quantity(Estimate(m.value, m.standard_error, m.unit))
-            parts.append(f"{_spoken(name)} is {value}, not {m.before:.4g}")
+            parts.append(f"{_spoken(name)} is {quantity(m.estimate)}, not {m.before:.4g}")
         else:
-            value = quantity(Estimate(abs(m.value), m.standard_error, m.unit))
+            value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
     text = f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force"
     return f"{text}{indistinct(rivals)}."
@@ -71,10 +70,10 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
 GAIN = "gain"
 
 
-def _times(factor: float, error: float) -> str:
+def _times(factor: Estimate) -> str:
     """The recorded force as a multiple of the simulator's; of another sign where it is negative."""
-    size = quantity(Estimate(abs(factor), error, ""))
-    if factor < 0:
+    size = quantity(factor._replace(value=abs(factor.value), unit=""))
+    if factor.value < 0:
         return (
             f"the recorded force has the opposite sign, and {size} times the size of the "
             "simulator's: turn one of them round (--scale force=-1)"
@@ -108,8 +107,7 @@ def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()
     """Values that another recording had otherwise, as a sentence; ± of the change, 95 %."""
     parts = []
     for name, m in moved.items():
-        error = math.hypot(float(m.standard_error), m.before_error)
-        half = 2 * error
+        half = float(m.change.half_width())
         digits = max(0, 1 - math.floor(math.log10(half))) if 0 < half < math.inf else 3
         unit = f" {m.unit}" if m.unit not in ("", "1") else ""
         way = "rose" if m.value > m.before else "fell"

@@ -35,14 +35,7 @@ def identification(
     of `filtered_force_error` went. Both are null where it was not computed. `stick`: the break-away
     levels, which the model then holds.
     """
-    parameters = {
-        name: {
-            "value": float(estimate.value),
-            "standard_error": float(estimate.standard_error),
-            "unit": estimate.unit,
-        }
-        for name, estimate in found.parameters.items()
-    }
+    parameters = {name: estimate.to_dict() for name, estimate in found.parameters.items()}
     remarks, units = list(found.remarks), dict(found.model.units)
     if test is not None and (contradiction := contradicts(test, units)):
         remarks.append(contradiction)

@@ -78,14 +78,7 @@ class Presliding(NamedTuple):
         """The bristles as plain data, in the units of the recording."""
         values = {"stiffness": self.stiffness, "damping": self.damping}
         told: dict[str, Any] = {
-            name: None
-            if each is None
-            else {
-                "value": float(each.value),
-                "standard_error": float(each.standard_error),
-                "unit": each.unit,
-            }
-            for name, each in values.items()
+            name: None if each is None else each.to_dict() for name, each in values.items()
         }
         kinds = [each._asdict() for each in self.kinds]
         told |= {"distance": self.distance, "seconds": self.seconds, "why": self.why}
@@ -206,7 +199,7 @@ def _told(found: Any, rows: Rows, values: np.ndarray) -> Presliding:
     ends = jnp.asarray([-1e-9, 1e-9]) * signals.scales(rows.recording).fastest
     level = float(jnp.mean(jnp.abs(bristles.dry(static.term, static.alpha, ends))))
     if not errors[0] < TOLD:
-        reach = float(np.exp(2 * errors[0]))
+        reach = float(np.exp(Estimate(values[0], errors[0], "").half_width()))
         why = "the stiffness is not told to within a factor of three"
         if reach < 100:
             why += f" (its 95 % interval reaches over a factor of {reach:.2g} each way)"

@@ -9,7 +9,6 @@ from ..data import summary
 from ..data.printable import printable
 from ..looks.text import Block, Table, aligned, text, wrapped
 from ..models import NAMED
-from .uncertainty import COSINES, student_quantile
 
 # The result whose diagnosis needs no words.
 FINE = "successful"
@@ -136,15 +135,15 @@ def warnings(document: Mapping[str, Any]) -> list[str]:
 
 
 def _cell(entry: Mapping[str, Any] | None) -> str:
-    if entry is None or not math.isfinite(entry["standard_error"]):
+    if entry is None or entry["interval"] is None:
         return "-"
     doubtful = _half(entry) > abs(entry["value"])
     return f"{'~' * doubtful}{entry['value']:.4g}"
 
 
 def _half(entry: Mapping[str, Any]) -> float:
-    """Half the 95 % interval."""
-    return student_quantile(0.975, COSINES) * entry["standard_error"]
+    """Half the 95 % interval, infinite where the recording does not show the value."""
+    return math.inf if (ends := entry["interval"]) is None else (ends[1] - ends[0]) / 2
 
 
 def _source(document: Mapping[str, Any]) -> list[str]:
@@ -169,7 +168,7 @@ def _how(document: Mapping[str, Any], automatic: bool) -> str:
 def _table(parameters: Mapping[str, Any], truth: Mapping[str, float] | None) -> Table:
     table = [["parameter", "value", "± 95 %", "unit"] + (["true"] if truth else [])]
     for name, entry in parameters.items():
-        seen = math.isfinite(entry["standard_error"])
+        seen = entry["interval"] is not None
         row = [
             name,
             f"{entry['value']:.5g}" if seen else "-",
@@ -186,7 +185,7 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
     gains = [
         f"{name} by {bias:+.2g} {parameters[name]['unit']}"
         for name, bias in document["open_ends"].items()
-        if abs(bias) > parameters[name]["standard_error"]
+        if abs(bias) > (parameters[name]["standard_error"] or math.inf)
     ]
     if not gains:
         return []
@@ -199,10 +198,10 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
 
 def _remarks(parameters: Mapping[str, Any]) -> list[str]:
     """What an engineer would object to, said first."""
-    sizes = {name: (e["value"], _half(e)) for name, e in parameters.items()}
+    seen = {name: entry for name, entry in parameters.items() if entry["interval"]}
+    sizes = {name: (entry["value"], _half(entry)) for name, entry in seen.items()}
     falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
-    # An infinite half width is "not visible", which the table and the diagnosis say already.
-    faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half < math.inf]
+    faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half]
     passive = ("coulomb", "viscous", "inertia")
     wrong = [n for n, (value, half) in sizes.items() if n.startswith(passive) and value < -half]
     lines = []

@@ -9,8 +9,9 @@ spectrum is flat below K half-periods a record, whereas blocks have to be many c
 long. What the record cannot see is infinitely uncertain.
 """
 
+import math
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -34,21 +35,40 @@ class Estimate(NamedTuple):
     value: Float[Array, ""]
     standard_error: Float[Array, ""]
     unit: str
-    degrees_of_freedom: int = COSINES
+    degrees_of_freedom: float = COSINES
+
+    def half_width(self, level: float = 0.95) -> Array:
+        """Half the confidence interval of that level, from Student's t distribution."""
+        return student_quantile(0.5 + 0.5 * level, self.degrees_of_freedom) * self.standard_error
 
     def interval(self, level: float = 0.95) -> tuple[Array, Array]:
         """The confidence interval of that level, from Student's t distribution."""
-        half = student_quantile(0.5 + 0.5 * level, self.degrees_of_freedom) * self.standard_error
+        half = self.half_width(level)
         return self.value - half, self.value + half
 
+    def to_dict(self) -> dict[str, Any]:
+        """A scalar estimate as plain data, with its 95 % interval; `None` for what is not seen."""
+        value, error = float(self.value), float(self.standard_error)
+        seen = math.isfinite(value) and math.isfinite(error)
+        return {
+            "value": value if math.isfinite(value) else None,
+            "standard_error": error if math.isfinite(error) else None,
+            "interval": [float(end) for end in self.interval()] if seen else None,
+            "unit": self.unit,
+        }
 
-def student_quantile(probability: float, degrees: int) -> float:
-    """Quantile of Student's t by its expansion about the normal (Abramowitz & Stegun 26.7.5)."""
+
+def student_quantile(probability: float, degrees: float) -> float:
+    """Quantile of Student's t by its expansion about the normal (Abramowitz & Stegun 26.7.5).
+
+    Of 97.5 % it is off by less than 0.5 % from three degrees of freedom on.
+    """
     z = NormalDist().inv_cdf(probability)
     first = (z**3 + z) / 4
     second = (5 * z**5 + 16 * z**3 + 3 * z) / 96
     third = (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384
-    return z + first / degrees + second / degrees**2 + third / degrees**3
+    fourth = (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92160
+    return z + first / degrees + second / degrees**2 + third / degrees**3 + fourth / degrees**4
 
 
 def places(weight: Float[Array, " J"]) -> Float[Array, " J"]:

@@ -8,8 +8,6 @@ from ..terms.effects.parameter_mismatch import MISMATCH
 from . import charts, equations
 from .advice import spoken
 
-# Half a 95 % interval in standard errors, as in the findings' sentences.
-HALF_WIDTH = 2.0
 _NONE = "–"
 _ERRORS = {
     "force_error": "Force error",
@@ -196,10 +194,12 @@ def _estimate(entry: Mapping[str, Any]) -> tuple[str, str, str]:
     value = _number(entry.get("value", entry.get("to")))
     if "from" in entry:
         value = f"{_number(entry['from'])} → {value}"
-    error = entry.get("standard_error")
-    seen = error is not None and math.isfinite(error)
-    unit = entry.get("unit") or ""
-    return value, _number(HALF_WIDTH * error, 2) if seen else "not visible", unit
+    ends = entry.get("interval")
+    return (
+        value,
+        "not visible" if ends is None else _number((ends[1] - ends[0]) / 2, 2),
+        (entry.get("unit") or ""),
+    )
 
 
 def _number(value: float | None, digits: int = 5) -> str:

@@ -15,9 +15,6 @@ from .faults import DRIFT, OFFSET, ZERO, FaultSearch
 from .rows import Part
 from .wiring import Wiring
 
-# Standard errors beyond which a value of no finding would have been looked at.
-HALF_WIDTH = 2.0
-
 
 class Check(NamedTuple):
     """One thing that was looked at.
@@ -41,19 +38,15 @@ class Check(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """The row as plain data."""
-        value = self.value and {
-            "value": _plain(self.value.value),
-            "standard_error": _plain(self.value.standard_error),
-            "unit": self.value.unit,
-        }
         return {
-            "check": self.effect, "wrong": self.wrong, "value": value or None, "text": self.text,
-            "attribute": self.attribute,
+            "check": self.effect, "wrong": self.wrong, "value": self.value and self.value.to_dict(),
+            "text": self.text, "attribute": self.attribute,
         }  # fmt: skip
 
 
-def _plain(number) -> float | None:
-    return float(number) if np.isfinite(number) else None
+def _half(error: float) -> float:
+    """Half the 95 % interval."""
+    return float(Estimate(np.float64(0.0), np.float64(error), "").half_width())
 
 
 def checks_of(
@@ -148,9 +141,10 @@ def _clock(part: Part, seen: FaultSearch) -> Check:
             error = faults.errors.get(DRIFT, 0.0)
             text += (
                 f" in the middle of the log, and {abs(faults.drift) * 1e6:.0f} ± "
-                f"{2e6 * error:.1g} µs more {'late' if faults.drift > 0 else 'early'} each second"
+                f"{1e6 * _half(error):.1g} µs more {'late' if faults.drift > 0 else 'early'} each "
+                "second"
             )
-            if abs(faults.late) < HALF_WIDTH * late.standard_error:
+            if abs(faults.late) < late.half_width():
                 late = Estimate(np.float64(faults.drift), np.float64(error), "1")
         near = () if faults.drift else ("sensor_filter",)
         return Check("clock", f"{text}.", True, False, late, "delay", None, near, _APART)
@@ -160,7 +154,7 @@ def _clock(part: Part, seen: FaultSearch) -> Check:
     late = Estimate(value, error, "s")
     drift = seen.values[DRIFT]
     text = f"Force and motion are on one clock (force {quantity(late)} late"
-    text += f", drift {drift[0] * 1e6:.2g} ± {2e6 * drift[1]:.1g} µs a second)."
+    text += f", drift {drift[0] * 1e6:.2g} ± {1e6 * _half(drift[1]):.1g} µs a second)."
     return Check("clock", text, value=late, parameter="delay")
 
 

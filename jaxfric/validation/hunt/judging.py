@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ...identification.uncertainty import COSINES, student_quantile
 from .logs import Log
 from .mistake import Mistake
 
@@ -54,13 +53,10 @@ def off(parameters: Mapping[str, Any], log: Log) -> list[str]:
     level += abs(truth["inertia"]) * weights["inertia"]
     found = []
     for name, weight in weights.items():
-        if (entry := parameters.get(name)) is None or entry.get("standard_error") is None:
+        if (entry := parameters.get(name)) is None or (ends := entry.get("interval")) is None:
             continue  # it says that it does not know
-        value = entry["value"]
-        if value is None:
-            continue
+        value, half = entry["value"], (ends[1] - ends[0]) / 2
         error = abs(value - truth[name])
-        half = student_quantile(0.975, COSINES) * entry["standard_error"]
         limit = QUARTER * max(abs(truth[name]) * weight, LEAST_SHARE * level)
         if error * weight > limit and error > half:
             found.append(f"{name} {value:.3g} ± {half:.1g} for {truth[name]:.3g}")

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...identification.uncertainty import COSINES, student_quantile
 from ...terms.effects import EFFECTS
 from ...terms.effects.actuator_saturation import ACTUATOR_SATURATION
 from .planning import Case
@@ -245,11 +244,6 @@ def _parameters(finding: Mapping[str, Any], truth: Mapping[str, Any]) -> Iterato
 
 
 def _ends(estimate: Mapping[str, Any]) -> tuple[float, float] | tuple[None, None]:
-    """The 95 % interval: as it was given, else by Student's t with the library's fewest degrees."""
-    if estimate.get("interval"):
-        return tuple(estimate["interval"])
-    spread = estimate.get("standard_error")
-    if spread is None:
-        return None, None
-    reach = student_quantile(0.975, COSINES) * spread
-    return estimate["value"] - reach, estimate["value"] + reach
+    """The 95 % interval, where there is one."""
+    low, high = estimate.get("interval") or (None, None)
+    return low, high
