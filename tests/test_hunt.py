@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxfric import cli
+from jaxfric.identification.uncertainty import Estimate
 from jaxfric.validation.hunt import (
     MISTAKES,
     Case,
@@ -98,7 +99,7 @@ def test_other_units_leave_the_physics_as_it_is(pair):
 
 def document(log, factor=1.0, error=1e-3, **more):
     parameters = {
-        name: {"value": factor * value, "standard_error": error * abs(value)}
+        name: Estimate(factor * value, error * abs(value), "").to_dict()
         for name, value in log.truth.items()
     }
     rest = {"result": "successful", "diagnosis": "", "force_error": 0.02, "recording": {}}
