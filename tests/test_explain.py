@@ -875,7 +875,21 @@ def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     assert not columns_of.serves(evidence.gather(motion, 2 * seen.width))
     assert not columns_of.serves(evidence.gather(motion_of(healthy[1]), seen.width))
     first = problem.problem_of(healthy[0], gaussian)
-    again = problem.problem_of(healthy[0], gaussian, first.base, first)
+    again = problem.problem_of(healthy[0], gaussian, first)
+    assert again.candidate_set is first.candidate_set
+
+
+def test_a_model_that_asks_for_another_alignment_gets_it(healthy):
+    motion = motion_of(healthy[0])
+    first = problem.problem_of(motion, models.named("gaussian"))
+    assert problem.realigned(motion, first, first.base) is first
+    interval = first.evidence.limits.interval
+    off = first.delay + 0.3 * interval
+    seen, wide = (evidence.gather(motion, e.width, off) for e in (first.evidence, first.wide))
+    again = problem.realigned(
+        motion, first._replace(evidence=seen, wide=wide, delay=off), first.base
+    )
+    assert abs(again.delay - first.delay) < 0.1 * interval
     assert again.candidate_set is first.candidate_set
 
 

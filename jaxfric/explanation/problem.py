@@ -72,23 +72,20 @@ class Problem(NamedTuple):
 
 
 def problem_of(
-    recording: Recording | Motion,
-    structure: AbstractTerm,
-    known: Fit | None = None,
-    before: Problem | None = None,
+    recording: Recording | Motion, structure: AbstractTerm, before: Problem | None = None
 ) -> Problem:
     """The regression problem of a recording, force and motion aligned.
 
-    **Arguments:** `known`: the model to align by, by default the baseline; `before`: a problem of
-    the same motion and baseline, whose columns serve again if only the force has been shifted.
+    **Arguments:** `before`: a problem of the same motion and baseline, whose columns serve again if
+    only the force has been shifted.
     """
     motion = motion_of(recording)
     evidence = gather(motion)
     if before is not None:
-        return _aligned(motion, evidence, structure, known, before.candidate_sets)
+        return _aligned(motion, evidence, structure, before.candidate_sets)
     candidates = CandidateSet(evidence, structure)
     try:
-        problem = _aligned(motion, evidence, structure, known, (candidates,))
+        problem = _aligned(motion, evidence, structure, (candidates,))
     except BaseException:
         candidates.close()
         raise
@@ -96,6 +93,19 @@ def problem_of(
         candidates.close()
         problem = problem._replace(candidate_sets=problem.candidate_sets[:1])
     return problem
+
+
+def realigned(recording: Recording | Motion, problem: Problem, known: Fit) -> Problem:
+    """The problem aligned by another model; itself where that makes no difference."""
+    motion, in_slip = motion_of(recording), problem.in_slip or problem
+    kernels = in_slip.evidence, in_slip.wide
+    later = _later(*kernels, in_slip.delay, known)
+    if abs(later - in_slip.delay) <= ALIGNED * in_slip.evidence.limits.interval:
+        return problem
+    kernels = _taken_later(motion, *kernels, later)
+    evidence, wide, delay = _aligned_by(motion, *kernels, later, known)
+    structure, candidate_sets = problem.structure, problem.candidate_sets
+    return _assembled(motion, evidence, wide, structure, known, candidate_sets, delay, False)
 
 
 def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem:
@@ -119,20 +129,40 @@ def with_holdout(problem: Problem, holdout: Recording | Motion) -> Problem:
     return problem._replace(held=held)
 
 
-def _aligned(motion, evidence: Evidence, structure, known, candidate_sets) -> Problem:
-    wide, delay, sample = _wider(motion, evidence), 0.0, evidence.limits.interval
-    known = fit([structure], evidence) if known is None else known
-    # To first order a delay is a column; the first estimate is good to a fifth of a sample.
+def _aligned(motion, evidence: Evidence, structure, candidate_sets) -> Problem:
+    base = fit([structure], evidence)
+    evidence, wide, delay = _aligned_by(motion, evidence, _wider(motion, evidence), 0.0, base)
+    return _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, False)
+
+
+def _aligned_by(
+    motion, evidence: Evidence, wide: Evidence | None, delay: float, known: Fit
+) -> tuple[Evidence, Evidence | None, float]:
+    """The rows with the force taken later by a delay, s, that the model `known` asks for.
+
+    To first order a delay is a column; the first estimate is good to a fifth of a sample.
+    """
     for _ in range(3):
         last = delay
-        delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
-        if abs(delay) > sample:
-            delay = -0.5 * sample
-        evidence = gather(motion, evidence.width, delay)
-        wide = None if wide is None else gather(motion, wide.width, delay)
-        if abs(delay - last) < 0.5 * ALIGNED * sample:
+        delay = _later(evidence, wide, delay, known)
+        evidence, wide = _taken_later(motion, evidence, wide, delay)
+        if abs(delay - last) < 0.5 * ALIGNED * evidence.limits.interval:
             break
-    return _assembled(motion, evidence, wide, structure, known, candidate_sets, delay, False)
+    return evidence, wide, delay
+
+
+def _taken_later(
+    motion, evidence: Evidence, wide: Evidence | None, delay: float
+) -> tuple[Evidence, Evidence | None]:
+    there = gather(motion, evidence.width, delay)
+    return there, None if wide is None else gather(motion, wide.width, delay)
+
+
+def _later(evidence: Evidence, wide: Evidence | None, delay: float, known: Fit) -> float:
+    """The delay, s, that is left after one more estimate; beyond a sample it is to be found."""
+    sample = evidence.limits.interval
+    delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
+    return -0.5 * sample if abs(delay) > sample else delay
 
 
 def _assembled(

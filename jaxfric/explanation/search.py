@@ -10,7 +10,7 @@ from .baseline import as_given
 from .contest import Contest
 from .findings import Findings, Solution, alone
 from .motion import Motion
-from .problem import ALIGNED, Problem, across_reversals, problem_of
+from .problem import Problem, across_reversals, problem_of, realigned
 from .selection import Selection
 from .stepwise import select
 from .timing import late, overlooked, with_late_force
@@ -67,9 +67,8 @@ def aligned(
     """The terms selected; once more if they change how force and motion are aligned."""
     found = _selected(motion, problem, seed, refused)
     if found.selection.selected:
-        again = problem_of(motion, problem.structure, found.selection.last, found.problem)
-        interval = found.problem.evidence.limits.interval
-        if abs(again.delay - found.problem.delay) > ALIGNED * interval:
+        again = realigned(motion, found.problem, found.selection.last)
+        if again is not found.problem:
             return _selected(motion, again, seed, refused)
     return found
 
