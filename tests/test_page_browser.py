@@ -23,7 +23,12 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
     out = tmp_path_factory.mktemp("page") / "page.html"
-    long = {"value": -0.0011761, "standard_error": 0.00062, "unit": "counts·s²/(N·m)²"}
+    long = {
+        "value": -0.0011761,
+        "standard_error": 0.00062,
+        "interval": [-0.0024, 0.00005],
+        "unit": "counts·s²/(N·m)²",
+    }
     own = {"name": "gaussian", "parameters": {"stribeck_velocity+": long}}
     document = DOCUMENT | {"model": model().to_dict(), "baseline": own}
     out.write_text(page.render(document, curves(), "jaxfric explain axis.csv", "today"), "utf-8")

@@ -215,3 +215,20 @@ def test_degrees_of_freedom_follow_the_blocks_that_tell():
     one, eight, all_ = intervals.spread(fit, block).degrees_of_freedom(np.eye(3))
     # What one block holds is judged by the noise of all.
     assert 18 < one < 26 and 5 < eight < 8 and 18 < all_ < 24
+
+
+@pytest.mark.parametrize("cycles", [0.05, 0.1, 0.12, 0.15, 0.3])
+def test_what_a_kernel_of_twice_the_width_blurs(cycles):
+    """By the kernel itself, on a wave of so many cycles a row: less than half of its power."""
+    half = 200
+    offsets = np.arange(-2 * half, 2 * half + 1)
+
+    def passed(width):
+        kernel = np.maximum(1 - (offsets / width) ** 2, 0.0) ** 4
+        return np.sum(kernel * np.cos(2 * np.pi * cycles * offsets / (half / 2))) / kernel.sum()
+
+    rows = np.concatenate([np.arange(100), 150 + np.arange(100)])
+    wave = np.sin(2 * np.pi * cycles * rows + 0.3)
+    fit = types.SimpleNamespace(jacobian=np.stack([wave, np.ones_like(wave)], axis=1))
+    (fast, steady) = intervals.blurred(fit, rows)
+    assert fast == (passed(2 * half) ** 2 < 0.5 * passed(half) ** 2) and not steady

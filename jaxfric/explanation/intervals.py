@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from ..identification.uncertainty import student_quantile
 from .least_squares import orthonormal
@@ -98,6 +98,24 @@ def spread(current: Fit, block: np.ndarray) -> Spread:
     matrix[hidden | (size == 0)] = np.inf
     matrix[:, hidden | (size == 0)] = np.inf
     return Spread(matrix, back, grams, freed, pooled)
+
+
+# A kernel of twice the half-width h smooths the rows by a Gaussian more, of variance 3 h²/11, about
+# that of one row. It halves the power of a wave of 0.13 cycles a row, of which neighbouring rows
+# differ by this part of its mean square.
+DIFFERS = 0.6
+
+
+def blurred(current: Fit, rows: Int[np.ndarray, " J"]) -> Bool[np.ndarray, " P"]:
+    """Of which parameters the force's derivative is too fast for a kernel of twice the width.
+
+    Less than half of its power would pass, and the nodes there are too far apart to tell it; `(P,)`.
+
+    **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`.
+    """
+    neighbours = np.flatnonzero(np.diff(rows) == 1)
+    one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
+    return np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:

@@ -12,6 +12,7 @@ from ..terms.sample import Burden
 from . import parameters as spelled
 from .contest import Contest, Finalist
 from .evidence import Evidence
+from .intervals import blurred
 from .predictions import with_predictions
 from .regression import Fit, at_shapes, fit
 from .significance import blocks, evenly
@@ -91,12 +92,14 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
     units = evidence.motion.unit_names
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     free = spelled.estimates(current, block, units)
-    own = spelled.estimates(at_shapes(current), block, units)
+    shaped = at_shapes(current)
+    own = spelled.estimates(shaped, block, units)
     there: Sequence[dict[str, Estimate] | None] = [None] * len(own)
     if wide is not None:
         rows = evenly(len(wide.rows), int(block[-1]) + 1)
         again = fit(current.terms, with_predictions(wide, current), current.betas, 0)
-        there = spelled.estimates(at_shapes(again), rows, units)
+        fast = blurred(shaped, evidence.rows)
+        there = spelled.estimates(at_shapes(again), rows, units, fast)
     for number in reversed(range(start, len(current.terms))):
         term = current.terms[number]
         gone = [free[number][name].interval() for name in traits(term).vanishes]

@@ -10,6 +10,7 @@ from . import parameters as spelled, verification
 from .baseline import refitted
 from .evidence import Evidence
 from .findings import Findings
+from .intervals import blurred
 from .regression import Fit, at_shapes, freed
 from .significance import evenly
 
@@ -27,16 +28,16 @@ def estimated(
     selection, rows = findings.selection, findings.problem
     units = rows.evidence.motion.unit_names
 
-    def told(current: Fit, block: np.ndarray) -> list[dict[str, Estimate]]:
+    def asked(current: Fit) -> Fit:
         current = freed(current, moved) if moved or selection.trusted else current
-        return spelled.estimates(at_shapes(current) if shaped else current, block, units)
+        return at_shapes(current) if shaped else current
 
-    def again(evidence: Evidence, known: Fit) -> list[dict[str, Estimate]]:
+    def again(evidence: Evidence, known: Fit) -> tuple[Fit, np.ndarray]:
         steps = 0 if shaped else 4
         current = refitted(evidence, known, others.given, others.free, steps)
-        return told(current, evenly(len(evidence.rows), int(problem.block[-1]) + 1))
+        return asked(current), evenly(len(evidence.rows), int(problem.block[-1]) + 1)
 
-    ours = told(selection.last, rows.block)
+    ours = spelled.estimates(asked(selection.last), rows.block, units)
     delayed = traits(selection.last.terms[-1]).late
     problem, others = findings.undelayed if delayed else findings.recorded
     late = [
@@ -48,12 +49,14 @@ def estimated(
     ]
     both = ours[: len(others.last.terms)]
     if problem.wide is not None:
-        wide = again(problem.wide, others.last)
+        current, block = again(problem.wide, others.last)
+        faint = blurred(asked(others.last), problem.evidence.rows)
+        wide = spelled.estimates(current, block, units, faint)
         both = [spelled.with_smoothing(*pair) for pair in zip(both, wide, strict=True)]
     if problem.held is not None:
         # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
         lasting = verification.lasting(others.last, others.rephased)
-        there = again(problem.held, lasting)
+        there = spelled.estimates(*again(problem.held, lasting), units)
         own = {id(term): values for term, values in zip(lasting.terms, there, strict=True)}
         both = [
             spelled.with_elsewhere(mine, own.get(id(term), mine))
