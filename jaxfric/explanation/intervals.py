@@ -109,9 +109,11 @@ DIFFERS = 0.6
 def blurred(current: Fit, rows: Int[np.ndarray, " J"]) -> Bool[np.ndarray, " P"]:
     """Of which parameters the force's derivative is too fast for a kernel of twice the width.
 
-    Less than half of its power would pass, and the nodes there are too far apart to tell it; `(P,)`.
+    Less than half of its power would pass, and the nodes there are too far apart to tell it.
 
     **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`.
+
+    **Returns:** which, `(P,)`.
     """
     neighbours = np.flatnonzero(np.diff(rows) == 1)
     one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
