@@ -104,20 +104,23 @@ def spread(current: Fit, block: np.ndarray) -> Spread:
 # that of one row. It halves the power of a wave of 0.13 cycles a row, of which neighbouring rows
 # differ by this part of its mean square.
 DIFFERS = 0.6
+HALF_POWER = 0.5
 
 
-def blurred(current: Fit, rows: Int[np.ndarray, " J"]) -> Bool[np.ndarray, " P"]:
-    """Of which parameters the force's derivative is too fast for a kernel of twice the width.
+def aliased(current: Fit, rows: Int[np.ndarray, " J"], wide: Fit) -> Bool[np.ndarray, " P"]:
+    """Of which parameters a kernel of twice the width shows the derivative falsely, `(P,)`.
 
-    Less than half of its power would pass, and the nodes there are too far apart to tell it.
+    Neighbouring rows differ so much that less than half of the power should pass there, and more
+    does: the nodes of that kernel are about a cycle apart, so that a fast wave looks slow.
 
-    **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`.
-
-    **Returns:** which, `(P,)`.
+    **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`;
+    `wide`, the same terms on the rows of that kernel.
     """
     neighbours = np.flatnonzero(np.diff(rows) == 1)
     one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
-    return np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
+    fast = np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
+    narrow, passed = (np.mean(each.jacobian**2, axis=0) for each in (current, wide))
+    return fast & (passed > HALF_POWER * narrow)
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:

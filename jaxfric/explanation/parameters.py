@@ -111,7 +111,7 @@ def with_smoothing(ours: dict[str, Estimate], wide: dict[str, Estimate]) -> dict
 
     Smoothing grows with the width; what the encoder's noise does to a column, and the rows beside
     a reversal, go the other way. What a kernel of twice the width, `wide`, changes beyond its own
-    noise is an error of the method, to be counted as it is (Barlow 2002). What it does not pass
+    noise is an error of the method, to be counted as it is (Barlow 2002). What it shows falsely
     (parameters with no finite error there) it says nothing about.
     """
     return _widened(ours, wide, lambda own, there, apart: apart**2 - there**2)

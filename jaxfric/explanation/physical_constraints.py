@@ -12,7 +12,7 @@ from ..terms.sample import Burden
 from . import parameters as spelled
 from .contest import Contest, Finalist
 from .evidence import Evidence
-from .intervals import blurred
+from .intervals import aliased
 from .predictions import with_predictions
 from .regression import Fit, at_shapes, fit
 from .significance import blocks, evenly
@@ -98,8 +98,9 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
     if wide is not None:
         rows = evenly(len(wide.rows), int(block[-1]) + 1)
         again = fit(current.terms, with_predictions(wide, current), current.betas, 0)
-        fast = blurred(shaped, evidence.rows)
-        there = spelled.estimates(at_shapes(again), rows, units, fast)
+        there_shaped = at_shapes(again)
+        false = aliased(shaped, evidence.rows, there_shaped)
+        there = spelled.estimates(there_shaped, rows, units, false)
     for number in reversed(range(start, len(current.terms))):
         term = current.terms[number]
         gone = [free[number][name].interval() for name in traits(term).vanishes]

@@ -10,7 +10,7 @@ from . import parameters as spelled, verification
 from .baseline import refitted
 from .evidence import Evidence
 from .findings import Findings
-from .intervals import blurred
+from .intervals import aliased
 from .regression import Fit, at_shapes, freed
 from .significance import evenly
 
@@ -50,8 +50,8 @@ def estimated(
     both = ours[: len(others.last.terms)]
     if problem.wide is not None:
         current, block = again(problem.wide, others.last)
-        faint = blurred(asked(others.last), problem.evidence.rows)
-        wide = spelled.estimates(current, block, units, faint)
+        false = aliased(asked(others.last), problem.evidence.rows, current)
+        wide = spelled.estimates(current, block, units, false)
         both = [spelled.with_smoothing(*pair) for pair in zip(both, wide, strict=True)]
     if problem.held is not None:
         # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
