@@ -83,17 +83,8 @@ def answered(recording: Recording, baseline: str, holdout: Recording | None) -> 
     seconds = time.perf_counter() - start
     document = found.to_dict()
     kept = {key: document[key] for key in KEPT}
-    for finding, told in zip(kept["findings"], found.findings, strict=True):
-        for name, estimate in told.parameters.items():
-            finding["parameters"][name] |= _interval(estimate)
     facts = {"baseline": baseline, "recording": document["recording"], "seconds": seconds}
     return {"error": None, **kept, **facts, "run": _run(found, recording, holdout)}
-
-
-def _interval(estimate) -> dict[str, Any]:
-    """The 95 % interval as the explanation gives it, where it is bounded."""
-    ends = [float(end) for end in estimate.interval()]
-    return {"interval": ends} if np.isfinite(ends).all() else {}
 
 
 def _run(found: Explanation, recording: Recording, holdout: Recording | None) -> dict[str, Any]:
