@@ -124,7 +124,7 @@ def _different(
         before = [*model.alpha, *model.term.beta()]
         away = {
             i: abs(float(values[names[i]].value) - float(before[i]))
-            / float(values[names[i]].half_width())
+            / float(spelled.tested(values[names[i]]).half_width())
             for i in free
         }
         least = min(away, key=lambda i: away[i])

@@ -14,6 +14,7 @@ from ..terms.effects import Wave, wave
 from ..units import spell
 from .intervals import spread
 from .regression import Fit
+from .significance import BLOCKS
 
 
 def whole(current: Fit) -> AbstractTerm:
@@ -61,6 +62,15 @@ def estimates(
     return result
 
 
+def tested(estimate: Estimate) -> Estimate:
+    """The estimate as a finding is tested: with a degree of freedom for each block of the record.
+
+    That there is a force at all has been tested by flips of whole blocks. Of a force that acts in
+    two reversals the interval is wider, since it has two degrees; that is no reason to doubt it.
+    """
+    return estimate._replace(degrees_of_freedom=max(estimate.degrees_of_freedom, BLOCKS))
+
+
 def may_be_none(
     term: AbstractTerm, own: dict[str, Estimate], wide: dict[str, Estimate] | None = None
 ) -> bool:
@@ -72,10 +82,10 @@ def may_be_none(
     """
 
     def sure(name: str) -> bool:
-        low, high = own[name].interval()
+        low, high = tested(own[name]).interval()
         if low * high <= 0 or wide is None:
             return bool(low * high > 0)
-        least, most = wide[name].interval()
+        least, most = tested(wide[name]).interval()
         apart = float(own[name].value) - float(wide[name].value)
         return bool(
             abs(apart) <= np.hypot(high - low, most - least) / 2

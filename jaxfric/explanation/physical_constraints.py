@@ -103,7 +103,7 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
         there = spelled.estimates(there_shaped, rows, units, false)
     for number in reversed(range(start, len(current.terms))):
         term = current.terms[number]
-        gone = [free[number][name].interval() for name in traits(term).vanishes]
+        gone = [spelled.tested(free[number][name]).interval() for name in traits(term).vanishes]
         none = any(low <= 0 for low, _ in gone)
         if none or spelled.may_be_none(term, own[number], there[number]):
             yield number - start
