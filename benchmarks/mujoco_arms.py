@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import jax
 import mujoco
 import numpy as np
-from mujoco_proof import EFFECTS, said
+from mujoco_proof import outcome_of, said
 
 import jaxfric as jf
 
@@ -73,8 +73,9 @@ def arm(seed: int, number: int):
         logs = [log(ran, i) for ran in runs]
         found = jf.explain(logs[0], jf.simulators.mujoco(nominal, joint), logs[1])
         own = kind if i == changed else "nothing"
-        truth = plant[i][kind] if own in VALUES else 0.0
-        yield joint, own, outcome(own, joint, truth, found), said(found)
+        name = f"joint/{joint}/{VALUES[own]}" if own in VALUES else ""
+        truth = plant[i][own] if own in VALUES else 0.0
+        yield joint, own, outcome_of(own, name, truth, found), said(found)
 
 
 def drawn(rng) -> list[dict[str, float]]:
@@ -152,28 +153,6 @@ def log(ran, joint: int) -> jf.Recording:
     others = {name: counted[:, i] for i, name in enumerate(JOINTS) if i != joint}
     units = {"force": "N·m", "position": "rad"}
     return jf.Recording(time, force[:, joint], counted[:, joint], channels=others, units=units)
-
-
-def outcome(kind: str, joint: str, truth: float, found) -> str:
-    """Right, biased, declared (among what cannot be told apart), beside, or wrong."""
-    effects = {finding.effect for finding in found.findings}
-    near = {name for finding in found.findings for name in finding.confusable_with}
-    if kind == "nothing":
-        return "right" if found.verdict == "consistent" else "wrong"
-    if kind in EFFECTS:
-        if EFFECTS[kind] & effects:
-            return "right" if effects <= EFFECTS[kind] | {"parameter_mismatch"} else "beside"
-        return "declared" if EFFECTS[kind] & near else "wrong"
-    name = f"joint/{joint}/{VALUES[kind]}"
-    if effects != {"parameter_mismatch"}:
-        return "wrong" if "parameter_mismatch" not in effects else "beside"
-    (finding,) = found.findings
-    if set(finding.parameters) != {name}:
-        near = {other for others in finding.instead.values() for other in others}
-        return "declared" if len(finding.parameters) == 1 and name in near else "beside"
-    (value,) = finding.parameters.values()
-    away, moved = abs(float(value.value) - truth), abs(truth - value.before)
-    return "right" if away <= float(value.half_width()) + 0.02 * moved else "biased"
 
 
 if __name__ == "__main__":

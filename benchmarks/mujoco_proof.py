@@ -111,7 +111,9 @@ def case(seed: int, number: int):
         found = jf.explain(logs[0], simulators[joint], logs[1])
         ratio = run_again(nominal, simulators, JOINTS[joint], found, logs, runs[0], values)
         away = None if kind not in VALUES else distance(kind, plant, extra, found)
-        yield kind, outcome(kind, plant, values, extra, found), said(found), ratio, away
+        name = VALUES.get(kind, "")
+        truth = truth_of(kind, plant, extra) if name else 0.0
+        yield kind, outcome_of(kind, name, truth, found), said(found), ratio, away
 
 
 def run_again(nominal: str, simulators, joint: str, found, logs, ran, values) -> float | None:
@@ -227,14 +229,17 @@ def log(ran, joint: int, two: bool, values: dict) -> jf.Recording:
     return jf.Recording(time, force[:, joint], counted[:, joint], channels=others, units=units)
 
 
-def outcome(kind: str, plant: dict, values: dict, extra: dict, found) -> str:
-    """Right, declared (among what cannot be told apart), or wrong."""
+def outcome_of(kind: str, name: str, truth: float, found) -> str:
+    """Right, biased, declared (among what cannot be told apart), beside, or wrong.
+
+    `name` of the attribute that has another value, the `truth`; none where it is physics.
+    """
     effects = {finding.effect for finding in found.findings}
     near = {name for finding in found.findings for name in finding.confusable_with}
     if kind == "nothing":
         return "right" if found.verdict == "consistent" else "wrong"
-    if kind in VALUES:
-        return _valued(VALUES[kind], truth_of(kind, plant, extra), effects, found)
+    if name:
+        return _valued(name, truth, effects, found)
     if EFFECTS[kind] & effects:
         return "right" if effects <= EFFECTS[kind] | {"parameter_mismatch"} else "beside"
     return "declared" if EFFECTS[kind] & near else "wrong"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.explanation import intervals
+from jaxfric.explanation import intervals, parameters
 from jaxfric.identification import uncertainty
 from jaxfric.identification.identified import result_names
 
@@ -239,3 +239,13 @@ def test_what_a_kernel_of_twice_the_width_shows_falsely(cycles):
     assert not intervals.aliased(fit(1.0), rows, fit(share)).any()
     fast, steady = intervals.aliased(fit(1.0), rows, fit(0.9))
     assert fast == (share**2 < 0.5) and not steady
+
+
+def test_a_force_of_few_blocks_is_told_with_its_own_degrees_and_tested_with_those_of_all():
+    """Presliding that two reversals hold, 3.9 standard errors from none."""
+    own = uncertainty.Estimate(np.float64(3.9), np.float64(1.0), "N", 2.0)
+    assert own.interval()[0] < 0 < parameters.tested(own).interval()[0]
+    weak = own._replace(value=np.float64(2.0))
+    assert parameters.tested(weak).interval()[0] < 0
+    sure = own._replace(degrees_of_freedom=60.0)
+    assert parameters.tested(sure) == sure
