@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..terms.effect import Effect
+from .candidates import Candidate
 from .contest import Contest, Finalist
 from .evidence import Evidence
 from .predictions import with_predictions
@@ -51,31 +52,39 @@ def accepted(
     round_: Contest, current: Fit, evidence, wider, base: Fit, selected: list[SelectedTerm]
 ) -> Finalist | None:
     """The best finalist that passes, beside the terms selected before; `None` if none does."""
-    least = LATER_SHARE if selected else LEAST_SHARE
-    force = float(evidence.force @ evidence.force)
-    before = [t.effect for t in selected]
+    least = _least_share(selected)
     for finalist in round_.finalists:
+        effect, term = finalist.effect, finalist.trial.candidate.term
         gained = current.energy - finalist.energy
-        candidate = finalist.trial.candidate
-        effect = candidate.effect
-        floor = LINEARITY**2 * force
-        enough = gained >= max(max(least, candidate.least) * current.energy, floor)
-        if effect.ubiquitous:
-            enough &= gained >= fast(current) ** 2 * len(current.residual)
+        enough = gained >= needed(finalist.trial.candidate, current, evidence, base, selected)
         if selected:
-            enough &= gained >= least_gain(
-                effect, before, base.energy, current.energy, LEAST_OF_BASE
-            )
             enough &= not _again(finalist, selected)
         level = RAREST if effect.sharp else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if (effect.sharp or candidate.term.swings) and not _confirmed(
-            finalist, current, wider, least
-        ):
+        if (effect.sharp or term.swings) and not _confirmed(finalist, current, wider, least):
             continue
         return finalist
     return None
+
+
+def needed(
+    candidate: Candidate, current: Fit, evidence: Evidence, base: Fit, selected: list[SelectedTerm]
+) -> float:
+    """The energy that a candidate must remove beside the terms selected before, N²."""
+    share = max(_least_share(selected), candidate.least)
+    least = max(share * current.energy, LINEARITY**2 * float(evidence.force @ evidence.force))
+    if candidate.effect.ubiquitous:
+        least = max(least, fast(current) ** 2 * len(current.residual))
+    if not selected:
+        return least
+    before = [each.effect for each in selected]
+    ours = least_gain(candidate.effect, before, base.energy, current.energy, LEAST_OF_BASE)
+    return max(least, ours)
+
+
+def _least_share(selected: list[SelectedTerm]) -> float:
+    return LATER_SHARE if selected else LEAST_SHARE
 
 
 def least_gain(

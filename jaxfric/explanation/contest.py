@@ -20,6 +20,9 @@ from .threads import each
 RIVAL = 5.0
 # Candidates refined beyond the grid: refining gains little over neighbouring grid points.
 FINALISTS = 8
+# Refining multiplies a candidate's gain by less than this: neighbouring points of a grid differ by
+# far less than a peak's height. (The most that was seen is 1.8, of a law of three parameters.)
+REFINED = 2.0
 
 
 class Trial(NamedTuple):
@@ -90,10 +93,12 @@ def contest(
     field: CandidateSet,
     seed: int = 0,
     among: Callable[[Effect], bool] = lambda effect: True,
+    needed: Callable[[Candidate], float] = lambda candidate: 0.0,
 ) -> Contest:
     """Let every candidate compete for the residual of a fit; `evidence` with its predictions.
 
-    `among`: whether an effect may be among the finalists.
+    `among`: whether an effect may be among the finalists; `needed`: the energy, N², that a
+    candidate must remove to be of use. Where none comes near it there are no finalists.
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
@@ -127,7 +132,9 @@ def contest(
     size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
     eligible = [t for t in trials if among(t.effect)]
-    return Contest(trials, _finals(seen, current, eligible, size), size)
+    within_reach = [REFINED * t.gain * current.energy >= needed(t.candidate) for t in eligible]
+    finalists = _finals(seen, current, eligible, size, any(within_reach))
+    return Contest(trials, finalists, size)
 
 
 def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
@@ -164,9 +171,13 @@ def _optima(betas: np.ndarray, gain: np.ndarray) -> tuple[np.ndarray, ...]:
     return tuple(found)
 
 
-def _finals(seen: Evidence, current: Fit, trials: list[Trial], size: float) -> list[Finalist]:
-    basis = current.basis()
+def _finals(
+    seen: Evidence, current: Fit, trials: list[Trial], size: float, within_reach: bool
+) -> list[Finalist]:
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
+    if not (bent or within_reach):
+        return []
+    basis = current.basis()
     # A sharp term may not be confirmed, and must not keep the next best from being looked at.
     blunt = [t for t in trials if not t.effect.sharp]
     leader = (blunt or trials)[0]

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..identification.uncertainty import student_quantile
+from ..terms.effects import traits
 from .least_squares import orthonormal
 from .regression import Fit
 
@@ -111,7 +112,8 @@ def aliased(current: Fit, rows: Int[np.ndarray, " J"], wide: Fit) -> Bool[np.nda
     """Of which parameters a kernel of twice the width shows the derivative falsely, `(P,)`.
 
     Neighbouring rows differ so much that less than half of the power should pass there, and more
-    does: the nodes of that kernel are about a cycle apart, so that a fast wave looks slow.
+    does: the nodes of that kernel are about a cycle apart, so that a fast wave looks slow. Asked of
+    waves alone: what a few reversals hold passes as its rows happen to lie, and truly.
 
     **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`;
     `wide`, the same terms on the rows of that kernel.
@@ -120,7 +122,10 @@ def aliased(current: Fit, rows: Int[np.ndarray, " J"], wide: Fit) -> Bool[np.nda
     one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
     fast = np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
     narrow, passed = (np.mean(each.jacobian**2, axis=0) for each in (current, wide))
-    return fast & (passed > HALF_POWER * narrow)
+    waves = np.zeros(len(fast), bool)
+    for number, term in enumerate(current.terms):
+        waves[current.indices(number)] = traits(term).waves(term) is not None
+    return waves & fast & (passed > HALF_POWER * narrow)
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:

@@ -206,6 +206,8 @@ def _lateness(kernels: list[Evidence], known: Fit) -> float:
         seen = with_predictions(evidence, known)
         current = fit(terms, seen, betas, 6)
         seen = with_predictions(seen, current)
-        both = fit([*terms, TransportDelay()], seen, [*current.betas, np.zeros(0)], 6)
-        delays.append(float(both.alphas[-1][0]))
+        column = seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
+        basis = current.basis()
+        column = column - basis @ (basis.T @ column)
+        delays.append(float(column @ current.residual / max(column @ column, 1e-300)))
     return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]

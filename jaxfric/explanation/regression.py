@@ -19,6 +19,11 @@ from .parameter_space import Space
 
 GRID = 24
 ITERATIONS = 20
+# Steps tried from one point, and by how much one of them may raise the damping.
+TRIALS, STEEPEST = 6, 64.0
+# Parts of the energy: a refinement ends with a step that gains less than `ENOUGH`, half a
+# thousandth of the amplitude of what is left, and tries none that should gain less than `NOTHING`.
+ENOUGH, NOTHING = 1e-6, 1e-9
 
 
 class Fit(NamedTuple):
@@ -250,7 +255,11 @@ def _scan(terms, evidence, space, point, unknown):
 
 
 def _refine(terms, evidence, space, point, iterations):
-    """Levenberg-Marquardt with Kaufman's Jacobian, inside the set."""
+    """Levenberg-Marquardt with Kaufman's Jacobian, inside the set.
+
+    Beside a large residual Gauss-Newton takes the energy for less curved than it is: the curvature
+    that a step has met, relative to that, less one is the damping of the next.
+    """
     damping, best = 1e-3, _at(terms, evidence, space, point, derivatives=True)
     for _ in range(iterations):
         basis = orthonormal(best.columns)
@@ -265,21 +274,31 @@ def _refine(terms, evidence, space, point, iterations):
         moving = ~stuck
         if not moving.any():
             break
-        for _ in range(6):
+        for _ in range(TRIALS):
             step = np.zeros_like(point)
             matrix = gram[np.ix_(moving, moving)] + damping * np.diag(size[moving])
             step[moving] = np.linalg.lstsq(matrix, pull[moving], rcond=None)[0]
             # A fifth of the set at most: Gauss-Newton knows no more than the neighbourhood.
             step *= min(1.0, 0.2 / max(np.max(np.abs(step)), 1e-300))
             trial_point = np.clip(point + step, 0.0, 1.0)
+            within, step = step, trial_point - point
+            bend, fall = float(step @ gram @ step), 2 * float(pull @ step)
+            if fall - bend < NOTHING * best.energy:
+                if np.array_equal(step, within):
+                    return best
+                damping *= 8  # the part of a step inside the set may lead upwards
+                continue
             trial = _at(terms, evidence, space, trial_point, derivatives=True)
+            beyond = (trial.energy - best.energy + fall) / max(bend, 1e-300) - 1
             if trial.energy < best.energy:
                 break
-            damping *= 8
+            steepest = STEEPEST * max(damping, 1.0)
+            damping = beyond if beyond < steepest else steepest
         else:
             break
         gained = best.energy - trial.energy
-        best, point, damping = trial, trial_point, max(damping / 8, 1e-9)
-        if gained < 1e-6 * best.energy:
+        damping = max(beyond, damping / 8, 1e-9)
+        best, point = trial, trial_point
+        if gained < ENOUGH * best.energy:
             break
     return best

@@ -64,22 +64,38 @@ def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
 def aligned(
     motion: Motion, problem: Problem, seed: int, refused: Refused = frozenset()
 ) -> Solution:
-    """The terms selected; once more if they change how force and motion are aligned."""
-    found = _selected(motion, problem, seed, refused)
-    if found.selection.selected:
-        again = realigned(motion, found.problem, found.selection.last)
-        if again is not found.problem:
-            return _selected(motion, again, seed, refused)
-    return found
+    """The terms selected, force and motion aligned by them.
+
+    The base alone may be aligned falsely by what it lacks, so that the first term aligns them anew
+    before others are looked for; and all of them once more, if they still ask for it.
+    """
+    first = select(problem, seed, refused=refused, first=True)
+    if not first.selected:
+        return _across(motion, problem, first, seed, refused)
+    again = realigned(motion, problem, first.last)
+    found = _selected(motion, again, seed, refused, first if again is problem else None)
+    if found.selection.names == first.names:
+        return found
+    again = realigned(motion, found.problem, found.selection.last)
+    return found if again is found.problem else _selected(motion, again, seed, refused)
 
 
-def _selected(motion: Motion, problem: Problem, seed: int, refused: Refused) -> Solution:
-    """What rows in slip show, and then, where the axis yields there, rows across reversals.
+def _selected(
+    motion: Motion, problem: Problem, seed: int, refused: Refused, begun: Selection | None = None
+) -> Solution:
+    """What rows in slip show, and then rows across reversals."""
+    in_slip = select(problem, seed, refused=refused, begun=begun)
+    return _across(motion, problem, in_slip, seed, refused)
+
+
+def _across(
+    motion: Motion, problem: Problem, in_slip: Selection, seed: int, refused: Refused
+) -> Solution:
+    """What rows across reversals show beyond those in slip, where the axis yields there.
 
     What acts at reversals is ten times as large in those, and no term has quite its shape: the
     remainder would hide all else.
     """
-    in_slip = select(problem, seed, refused=refused)
     across = across_reversals(motion, problem)
     if not across.reversals:
         return Solution(across, in_slip)

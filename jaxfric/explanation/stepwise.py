@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Hashable
 
-from .acceptance import LEAST_SHARE, accepted
+from .acceptance import LEAST_SHARE, accepted, needed
 from .contest import Finalist, Trial, contest
 from .evidence import Evidence
 from .intervals import left_out
@@ -24,20 +24,26 @@ def select(
     seed: int = 0,
     in_slip: Selection | None = None,
     refused: frozenset[Hashable] = frozenset(),
+    begun: Selection | None = None,
+    first: bool = False,
 ) -> Selection:
     """Add terms while they are accepted; after each, drop those that have become idle.
 
-    `refused`: forms of laws that do not compete.
+    `refused`: forms of laws that do not compete; `begun`: what has been selected for these rows
+    already; `first`: end with the first term.
     `in_slip`: what the rows in slip have shown, where those of the problem reach across reversals.
     Then only effects that act at reversals compete: all others have, where nothing hides them.
     """
     current, selected = _started(problem, in_slip)
+    if begun is not None:
+        current, selected = begun.last, begun.selected
     evidence, known = with_predictions(problem.evidence, current), len(selected)
     visited = set[Hashable]()
     while True:
         round_ = contest(
             evidence, current, problem.candidate_set, seed,
             lambda effect: in_slip is None or effect.at_reversals,
+            lambda each: needed(each, current, evidence, problem.base, selected),  # noqa: B023
         )  # fmt: skip
         allowed = [f for f in round_.finalists if f.trial.candidate.form not in refused]
         round_ = constrained(round_._replace(finalists=allowed), current, evidence)
@@ -56,6 +62,8 @@ def select(
             refused |= {selected[number].form}
             current = without(current, evidence, len(current.terms) - len(selected) + number)
             selected = [each for i, each in enumerate(selected) if i != number]
+        if first and selected:
+            break
     if in_slip is not None and len(selected) == known and selected:
         # No effect acts there, and the base fits these rows as well as it can.
         betas = (problem.base.betas[0], *current.betas[1:])
