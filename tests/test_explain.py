@@ -35,6 +35,7 @@ from jaxfric.explanation import (
     regression,
     reported,
     sanity,
+    search,
     selection,
     significance,
     spectral_lines,
@@ -614,6 +615,66 @@ def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeyp
     known = (terms.PeriodicDisturbance(), np.array([31.37]))
     both = regression.fit([structure, known[0]], posed.evidence, [posed.base.betas[0], known[1]], 2)
     assert not len(spectral_lines.fast_tone(posed.evidence, both))
+
+
+def test_a_refinement_beside_a_large_residual_ends_at_the_least_energy(healthy, monkeypatch):
+    """A wave of half the friction: Gauss-Newton's steps are twice as long as they should be."""
+    run = planted(healthy[0], terms.Cogging(), (8.0, 6.0), (0.02,))
+    seen, calls = evidence.gather(dataclasses.replace(run, velocity=None)), []
+    monkeypatch.setattr(
+        regression, "_at", lambda *a, at=regression._at, **k: calls.append(1) or at(*a, **k)
+    )
+    term = models.named("gaussian")
+    found = regression.fit([term], seen, [np.array([0.006, 0.015])])
+    assert len(calls) < 20
+    for velocities in np.array(found.betas[0]) * np.exp(0.03 * np.array([[1, 0], [0, 1], [1, 1]])):
+        for beta in (velocities, found.betas[0] ** 2 / velocities):
+            assert regression.fit([term], seen, [beta], 0).energy > found.energy
+    # From there no step is tried: none would gain anything.
+    calls.clear()
+    again = regression.fit([term], seen, found.betas)
+    assert len(calls) <= 2 and again.energy == pytest.approx(found.energy, rel=1e-6)
+
+
+def test_nothing_is_refined_where_nothing_could_be_selected(healthy, monkeypatch):
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    seen = predictions.with_predictions(posed.evidence, posed.base)
+    energy = posed.base.energy
+    needs = [0.0, 0.5 * energy, 3 * energy]
+    rounds = [
+        contest.contest(seen, posed.base, posed.candidate_set, needed=lambda _, n=n: n)
+        for n in needs
+    ]
+    assert [bool(each.finalists) for each in rounds] == [True, False, False]
+    assert [t.gain for t in rounds[0].trials] == [t.gain for t in rounds[2].trials]
+    first = rounds[0].trials[0]
+    asked = acceptance.needed(first.candidate, posed.base, seen, posed.base, [])
+    assert asked >= acceptance.LEAST_SHARE * energy
+    linear = acceptance.LINEARITY**2 * float(seen.force @ seen.force)
+    assert asked >= linear
+
+
+def test_force_and_motion_are_aligned_by_the_first_term_before_others_compete(healthy, monkeypatch):
+    """The rows that the others see do not hold what the base alone took for lateness."""
+    run = planted(healthy[0], terms.Cogging(), (2.0, 1.5), (0.013,))
+    searches = []
+
+    def select(posed, *args, **kwargs):
+        found = stepwise.select(posed, *args, **kwargs)
+        searches.append((posed.delay, kwargs.get("first", False), len(found.selected)))
+        return found
+
+    monkeypatch.setattr(search, "select", select)
+    monkeypatch.setattr(problem, "ALIGNED", 1e-4)
+    found = search.searched(motion_of(run), problem.problem_of(run, models.named("gaussian")), 0)
+    assert [t.effect.name for t in found.selection.selected] == ["cogging"]
+    (before, first, one), (after, whole, all_) = searches
+    assert first and not whole and one == all_ == 1 and before != after
+    searches.clear()
+    monkeypatch.setattr(problem, "ALIGNED", 10.0)  # the same rows: the search goes on
+    found = search.searched(motion_of(run), problem.problem_of(run, models.named("gaussian")), 0)
+    assert len({delay for delay, *_ in searches}) == 1 and len(searches) == 2
+    assert found.selection.selected[0].effect.name == "cogging"
 
 
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):

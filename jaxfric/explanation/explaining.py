@@ -11,7 +11,6 @@ from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..identification.identified import Identified
 from ..models import Model, named
-from ..simulation.prediction import unseen
 from ..simulators import AbstractSimulator
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, sanity, threads
@@ -19,13 +18,12 @@ from .attributes import in_own_words
 from .baseline import Baseline, at_values, baseline_of
 from .doubts import contradicted
 from .earlier import Earlier, changed, obeyed, rephased
-from .evidence import shortened
 from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
 from .holdout import check_signals, confirmed
 from .improvement import Improved, improved
-from .inputs import Inputs, as_seen, prepare
+from .inputs import Inputs, prepare
 from .mismatch import Mismatch, mismatch
 from .motion import Motion, motion_of
 from .parsimony import instead
@@ -77,14 +75,14 @@ def explain(
 
 def _finished(found: Explanation, inputs: Inputs) -> Explanation:
     """The explanation in the caller's precision, and in the words of the simulator, if any."""
-    recording, checked = shortened(inputs.recording), inputs.checked
+    checked, figures = inputs.checked, inputs.figures
     models = {
-        name: None if model is None else as_seen(inputs.figures.own(model), recording)
+        name: None if model is None else figures.as_seen(model)
         for name in ("model", "baseline", "holdout_model")
         for model in (getattr(found, name),)
     }
     values = dict(found.baseline_parameters)
-    for name in unseen(values, recording):
+    for name in figures.unseen(values):
         values[name] = values[name]._replace(value=np.float64(np.nan))
     holdout = None if inputs.holdout is None else facts(inputs.holdout)
     found = dataclasses.replace(
@@ -92,7 +90,7 @@ def _finished(found: Explanation, inputs: Inputs) -> Explanation:
         holdout=holdout,
     )  # fmt: skip
     found = in_own_words(found, inputs.attributes) if inputs.attributes else found
-    return found if checked is None else sanity.with_checks(found, checked, inputs.figures.x64)
+    return found if checked is None else sanity.with_checks(found, checked, figures.x64)
 
 
 def _explain(

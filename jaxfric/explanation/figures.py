@@ -1,6 +1,6 @@
 """The force errors that a user gets: a saved model, `predict`, and a subtraction."""
 
-from collections.abc import Hashable
+from collections.abc import Collection, Hashable
 
 import equinox as eqx
 import jax
@@ -10,7 +10,7 @@ import numpy as np
 from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model
-from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual
+from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual, unseen
 
 
 def cast(tree, dtype=float):
@@ -61,6 +61,21 @@ class Figures:
             moving, force = self._samples(where, delay)
             self._errors[key] = relative(self._left(model, where)[moving], force[moving])
         return self._errors[key]
+
+    def as_seen(self, model: Model) -> Model:
+        """The model in the caller's precision, without values of a direction in which the recording
+        does not move.
+        """
+        own = self.own(model)
+        lacking = self.unseen(own.parameters)
+        return own.with_parameters(dict.fromkeys(lacking, np.nan)) if lacking else own
+
+    def unseen(self, names: Collection[str]) -> list[str]:
+        """The names of parameters of a direction in which the recording does not move."""
+        if not any(name.endswith(("+", "-")) for name in names):
+            return []
+        moving, _ = self._samples("here", 0.0)
+        return unseen(names, self._motion("here"), moving)
 
     def _samples(self, where: str, delay: float) -> tuple[np.ndarray, np.ndarray]:
         """Which samples a figure is taken over, and the force, N, both `(N,)`."""

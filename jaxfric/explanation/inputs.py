@@ -14,7 +14,7 @@ from ..data.recording import Recording, check_same_units, require, require_force
 from ..identification.identified import Identified
 from ..identification.uncertainty import Estimate
 from ..models import NAMED, Model
-from ..simulation.prediction import outliers, unseen
+from ..simulation.prediction import outliers
 from ..simulators import AbstractSimulator, Attribute, Known, same_motion
 from ..terms import KNOWN, KNOWN_FORCE
 from ..terms.base import AbstractTerm
@@ -132,12 +132,6 @@ def _simulator(recording: Recording, baseline, holdout: Recording | None):
     return (
         Known(baseline) if callable(baseline) and not isinstance(baseline, given_as) else baseline
     )
-
-
-def as_seen(model: Model, recording: Recording) -> Model:
-    """The model without values of a direction in which the recording does not move."""
-    lacking = unseen(model.parameters, recording)
-    return model.with_parameters(dict.fromkeys(lacking, np.nan)) if lacking else model
 
 
 def _beside(recording: Recording, baseline, holdout: Recording | None, fixed: bool):

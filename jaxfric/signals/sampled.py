@@ -91,8 +91,9 @@ class SampledSignal(NamedTuple):
 
     def noise(self) -> float:
         """[`counted_noise`][] of the longest even stretches; beside a local quartic without any."""
-        parts = np.split(self.signal, np.flatnonzero(np.diff(self.even)) + 1)
-        parts = [part for part in parts if len(part) >= SHORT]
+        borders = np.concatenate([[0], np.flatnonzero(np.diff(self.even)) + 1, [len(self.signal)]])
+        long = np.flatnonzero(np.diff(borders) >= SHORT)
+        parts = [self.signal[borders[i] : borders[i + 1]] for i in long]
         if parts:
             sizes = np.array([counted_noise(part) for part in parts])
             return float(np.average(sizes, weights=[len(part) for part in parts]))

@@ -1,7 +1,7 @@
 """Backward in time, as it were: the force that a recorded motion needs."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from functools import cached_property, partial
 
 import equinox as eqx
@@ -48,8 +48,10 @@ class Prepared:
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
-        self.recording = signals.prepare(recording)
-        self._derived = recording.velocity is None
+        self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
+        if recording.velocity is None and not signals.is_traced(recording):
+            self._slope = signals.choose(recording)
+        self.recording = signals.prepare(recording, self._slope)
 
     @cached_property
     def choice(self) -> signals.Choice:
@@ -58,9 +60,9 @@ class Prepared:
         That which is best for a recorded velocity; for a derived one the wider of those that are
         best for the first and the second derivative of the position.
         """
-        if not self._derived:
+        if self._slope is None:
             return signals.choose(self.recording, self.recording.velocity)
-        both = (signals.choose(self.recording, order=order) for order in (1, 2))
+        both = self._slope, signals.choose(self.recording, order=2)
         return max(both, key=lambda each: each.half_width)
 
 
@@ -224,11 +226,12 @@ def _beside_turns(
     return near if few else np.zeros_like(near)
 
 
-def unseen(names: Sequence[str], recording: Recording) -> list[str]:
-    """The names of parameters (`+`, `-`) of a direction in which a recording does not move."""
-    prepared = Prepared.of(recording)
-    velocity = np.asarray(prepared.recording.velocity)[: recording.num_samples]
-    velocity = velocity[in_motion(recording, prepared=prepared)]
+def unseen(names: Collection[str], prepared: Prepared, moving: Bool[np.ndarray, " N"]) -> list[str]:
+    """The names of parameters (`+`, `-`) of a direction in which a recording does not move.
+
+    `moving`: the samples [`in_motion`][], `(N,)`.
+    """
+    velocity = np.asarray(prepared.recording.velocity)[: moving.size][moving]
     idle = [s for s, ways in (("+", velocity > 0), ("-", velocity < 0)) if not ways.any()]
     return [name for name in names if name.endswith(tuple(idle))]
 
