@@ -320,6 +320,27 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stages", "name", "rivals"),
+    [(1, "actuator_lag", ()), (2, None, ("actuator_lag", "transport_delay"))],
+)
+def test_several_lags_in_a_row_may_be_a_delay_or_a_lag(healthy, stages, name, rivals):
+    """Commanded is what lags in so many stages become the force that acts, at a smooth motion."""
+    rate, x, v = 1000.0, *set_point(0)
+    shares = np.fft.fft(PARAMETERS["inertia"] * np.gradient(v, TIME) + 22.0 * np.tanh(v / 0.02))
+    swing = 2j * np.pi * np.fft.fftfreq(len(TIME), 1 / rate)
+    lag = (1 + 0.012 / stages * swing) ** stages * (np.abs(swing) < 2 * np.pi * 60)
+    force = np.fft.ifft(shares * lag).real + np.random.default_rng(0).normal(0, 0.2, len(TIME))
+    run = jax.tree.map(lambda a: a[500:-500], Recording(TIME, force, x))
+    posed = problem.problem_of(run, models.named("gaussian"))
+    nothing = selection.Selection(posed.base, posed.base, [], contest.Contest([], [], 500.0))
+    found = timing.overlooked(motion_of(run), posed, nothing)
+    said = found.selected.effect.name, *found.selected.rivals
+    assert set(said) == set(rivals) if rivals else said == (name,)
+    assert found.time == pytest.approx(0.012, rel=0.2)
+
+
+@pytest.mark.slow
 def test_a_delay_is_found_from_a_guess_that_is_far_off(healthy):
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -10))
     run = jax.tree.map(lambda x: x[:-12], run)

@@ -6,8 +6,9 @@ from .contest import RIVAL, Contest, Finalist
 from .regression import Fit
 from .significance import LEVEL
 
-# No idealisation of a reversal is right to the last tenth of its score, and a law of three
-# nonlinear parameters finds that tenth in any of them: then the law with fewer is selected.
+# No idealisation of a reversal, or of what makes a force late, is right to the last tenth of its
+# score. A law of three nonlinear parameters finds that tenth in any of them: then the law with
+# fewer is selected.
 NO_EVIDENCE = 0.9
 
 

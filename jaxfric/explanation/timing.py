@@ -24,6 +24,7 @@ from .motion import Motion, motion_of
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fast, fit, without
+from .rivals import NO_EVIDENCE
 from .selection import SelectedTerm, Selection
 from .significance import BLOCKS, LEVEL, agreement
 
@@ -184,13 +185,19 @@ def _vertex(times: np.ndarray, heights: np.ndarray) -> float:
 
 
 def _told_apart(undoing: _Undoing, guess: float, selected: SelectedTerm, size: float) -> LateForce:
-    """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values."""
+    """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values.
+
+    Several lags in a row are neither: both take nearly all of it then, and either may be meant.
+    """
     problem = undoing.problem
     least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
     best = EFFECTS[min(least, key=lambda name: least[name][0])]
     energy, time = least.pop(best.name)
     others = {name: 0.5 * size * np.log(left / energy) for name, (left, _) in least.items()}
-    near = (name for name, gap in others.items() if gap < RIVAL)
+    as_it_is = undoing.rest(_as_it_is, 0.0)
+    score = 0.5 * size * np.log(float(as_it_is @ as_it_is) / energy)
+    nearly = max(RIVAL, (1 - NO_EVIDENCE) * score)
+    near = (name for name, gap in others.items() if gap < nearly)
     rivals = (*near, *(r for r in selected.rivals if r != best.name and r not in others))
     wide = time
     if problem.wide is not None:
