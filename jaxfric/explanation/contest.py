@@ -132,8 +132,11 @@ def contest(
     size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
     eligible = [t for t in trials if among(t.effect)]
-    within_reach = [REFINED * t.gain * current.energy >= needed(t.candidate) for t in eligible]
-    finalists = _finals(seen, current, eligible, size, any(within_reach))
+    # Where the base is at a limit of its set, leaving that removes something by itself.
+    beside = current.energy - bootstrap.scale**2
+    most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
+    within_reach = any(gain >= needed(t.candidate) for t, gain in zip(eligible, most, strict=True))
+    finalists = _finals(seen, current, eligible, size, within_reach)
     return Contest(trials, finalists, size)
 
 
