@@ -675,6 +675,29 @@ def test_nothing_is_refined_where_nothing_could_be_selected(healthy, monkeypatch
     assert asked >= linear
 
 
+def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
+    """From wherever its grid point lies; a step of the cost at every node stops a descent."""
+    for moment in (6.0, 7.03, 9.511):
+        run = planted(healthy[0], terms.PayloadChange(), (1.0, 2.0), (moment,))
+        posed = problem.problem_of(run, models.named("gaussian"))
+        seen = predictions.with_predictions(posed.evidence, posed.base)
+        mine = (isinstance(c.term, terms.PayloadChange) for c in posed.candidate_set.candidates)
+        step = posed.candidate_set.candidates[list(mine).index(True)]
+        grid, basis = step.betas[:, 0], posed.base.basis()
+        trial = contest.Trial(step, step.betas[0], 0.1, 0.01, 1, 0.002, 0.01, 1.0)
+        below, above = np.searchsorted(grid, moment) + [-1, 0]
+        found = [
+            contest._refined(seen, posed.base, trial._replace(beta=step.betas[i]), basis)
+            for i in (below, above)
+        ]
+        every = np.linspace(grid[below], grid[above], 300)[:, None]
+        target = seen.target - basis @ (basis.T @ seen.target)
+        least = target @ target - regression.gains(step.term, seen, every, basis).max()
+        assert all(each.energy < 1.02 * least for each in found)
+    waves = [c for c in posed.candidate_set.candidates if c.lines is not None]
+    assert all(not len(contest._between(trial._replace(candidate=c))) for c in waves)
+
+
 def test_force_and_motion_are_aligned_by_the_first_term_before_others_compete(healthy, monkeypatch):
     """The rows that the others see do not hold what the base alone took for lateness."""
     run = planted(healthy[0], terms.Cogging(), (2.0, 1.5), (0.013,))

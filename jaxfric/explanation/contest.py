@@ -10,7 +10,7 @@ from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
 from .outstanding import outstanding
-from .regression import Fit, fit
+from .regression import Fit, fit, gains
 from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
 from .spectral_lines import fast_tone
 from .threads import each
@@ -238,11 +238,33 @@ def _overtone(trial: Trial, found: Finalist) -> Trial:
 
 def _refined(seen, current, trial, basis) -> Finalist:
     """The candidate refined, the rest of the model fitted along to first order."""
-    term = trial.candidate.term
-    fits = (fit([term], seen, [beta], 8, basis) for beta in (trial.beta, *trial.others))
+    term, starts = trial.candidate.term, (trial.beta, *trial.others)
+    between = _between(trial)
+    if len(between):
+        starts = (between[int(np.argmax(gains(term, seen, between, basis)))],)
+    fits = (fit([term], seen, [beta], 8, basis) for beta in starts)
     found = min(fits, key=lambda each: each.energy)
     betas = (*current.betas, found.betas[0])
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
+
+
+# Points of a finer grid between the neighbours of a grid point.
+FINER = 17
+
+
+def _between(trial: Trial) -> np.ndarray:
+    """A finer grid about the grid point of a law of one parameter, `(F, 1)`; else none.
+
+    What a moment leaves is no parabola but a wedge, with steps of its own at every node: a
+    refinement from the grid point may stay where it is. A wave's grid resolves it.
+    """
+    candidate = trial.candidate
+    if candidate.lines is not None or candidate.betas.shape[1] != 1 or len(candidate.betas) < 2:
+        return np.zeros((0, 1))
+    grid = np.unique(candidate.betas)
+    at = int(np.searchsorted(grid, trial.beta[0]))
+    low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
+    return np.union1d(np.linspace(low, high, FINER), trial.beta)[:, None]
 
 
 _SPEED = frozenset({"velocity"})

@@ -155,6 +155,15 @@ def fit(
     return _refine(terms, rows, space, point, iterations)
 
 
+def gains(
+    term: AbstractTerm, evidence: "Evidence | Remembered", betas: np.ndarray, basis: np.ndarray
+) -> np.ndarray:
+    """The energy that a term removes at many β beside an orthonormal basis, N², `(G,)`."""
+    left = evidence.target - basis @ (basis.T @ evidence.target)
+    own = [orthonormal(rows, basis).T @ left for rows in evidence.columns(term, betas)]
+    return np.array([np.sum(each**2) for each in own])
+
+
 def freed(current: Fit, free: Iterable[int]) -> Fit:
     """A fit of whose base only some values were fitted; what stayed has no error."""
     moved, columns, slopes = set(free), current.columns.copy(), current.slopes.copy()
@@ -244,13 +253,8 @@ def _scan(terms, evidence, space, point, unknown):
                 if n != number
             ]
             fixed = orthonormal(np.concatenate([*others, np.zeros((len(evidence.target), 0))], 1))
-            left = evidence.target - fixed @ (fixed.T @ evidence.target)
-            gains = [
-                np.sum((orthonormal(rows, fixed).T @ left) ** 2)
-                for rows in evidence.columns(terms[number], betas)
-            ]
             point = point.copy()
-            point[i] = grid[int(np.argmax(gains))]
+            point[i] = grid[int(np.argmax(gains(terms[number], evidence, betas, fixed)))]
     return point
 
 
