@@ -156,7 +156,10 @@ def fit(
 
 
 def gains(
-    term: AbstractTerm, evidence: "Evidence | Remembered", betas: np.ndarray, basis: np.ndarray
+    term: AbstractTerm,
+    evidence: "Evidence | Beside | Remembered",
+    betas: np.ndarray,
+    basis: np.ndarray,
 ) -> np.ndarray:
     """The energy that a term removes at many β beside an orthonormal basis, N², `(G,)`."""
     left = evidence.target - basis @ (basis.T @ evidence.target)

@@ -74,7 +74,7 @@ def aligned(
         return _across(motion, problem, first, seed, refused)
     again = realigned(motion, problem, first.last)
     found = _selected(motion, again, seed, refused, first if again is problem else None)
-    if found.selection.names == first.names:
+    if len(found.selection.selected) == 1 and found.selection.names == first.names:
         return found
     again = realigned(motion, found.problem, found.selection.last)
     return found if again is found.problem else _selected(motion, again, seed, refused)
