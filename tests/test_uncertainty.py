@@ -13,7 +13,7 @@ from jaxfric.explanation import intervals, parameters
 from jaxfric.explanation.regression import Fit
 from jaxfric.identification import uncertainty
 from jaxfric.identification.identified import result_names
-from jaxfric.terms import Coulomb
+from jaxfric.terms import Coulomb, Sum
 from jaxfric.terms.effects.cogging import Cogging
 from jaxfric.terms.effects.presliding import Dahl
 
@@ -236,13 +236,12 @@ def test_what_a_kernel_of_twice_the_width_shows_falsely(cycles):
     share = passed(2 * half) / passed(half)
     rows = np.concatenate([np.arange(100), 150 + np.arange(100)])
     wave = np.sin(2 * np.pi * cycles * rows + 0.3)
-    terms = Cogging(), Coulomb(), Dahl()
+    terms = Sum((Cogging(), Coulomb())), Dahl()  # a wave of the baseline is one
 
     def fit(size):
         columns = np.stack([size * wave, size * wave, np.ones_like(wave), size * wave], axis=1)
         slopes = size * wave[:, None] * [1.0, 1.0]
-        betas = np.zeros(1), np.zeros(0), np.zeros(1)
-        alphas = np.zeros(2), np.zeros(1), np.zeros(1)
+        betas, alphas = (np.zeros(1), np.zeros(1)), (np.zeros(3), np.zeros(1))
         return Fit(terms, betas, alphas, columns, slopes, wave, 1.0)
 
     assert not intervals.aliased(fit(1.0), rows, fit(share)).any()

@@ -248,7 +248,8 @@ def _refined(seen, current, trial, basis) -> Finalist:
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
 
 
-# Points of a finer grid between the neighbours of a grid point.
+# Points of a finer grid between the neighbours of a grid point, an eighth of its step apart: of 192
+# moments in a record of 192 kernels, the fewest, these are nearer than a kernel reaches.
 FINER = 17
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ..identification.uncertainty import student_quantile
-from ..terms.effects import traits
+from ..terms.base import summands
 from .least_squares import orthonormal
 from .regression import Fit
 
@@ -122,10 +122,15 @@ def aliased(current: Fit, rows: Int[np.ndarray, " J"], wide: Fit) -> Bool[np.nda
     one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
     fast = np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
     narrow, passed = (np.mean(each.jacobian**2, axis=0) for each in (current, wide))
-    waves = np.zeros(len(fast), bool)
-    for number, term in enumerate(current.terms):
-        waves[current.indices(number)] = traits(term).waves(term) is not None
-    return waves & fast & (passed > HALF_POWER * narrow)
+    return _of_waves(current) & fast & (passed > HALF_POWER * narrow)
+
+
+def _of_waves(current: Fit) -> Bool[np.ndarray, " P"]:
+    """Which parameters are those of waves, in the baseline's sum too, `(P,)`."""
+    parts = [part for term in current.terms for part in summands(term)]
+    waves = [any(each.repeats for each in part.nonlinear) for part in parts]
+    kinds = ([len(p.affine) for p in parts], [len(p.nonlinear) for p in parts])
+    return np.concatenate([np.repeat(waves, counts) for counts in kinds])
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 import copy
 from collections.abc import Hashable
+from functools import partial
 
 from .acceptance import LEAST_SHARE, accepted, needed
 from .contest import Finalist, Trial, contest
@@ -29,10 +30,10 @@ def select(
 ) -> Selection:
     """Add terms while they are accepted; after each, drop those that have become idle.
 
-    `refused`: forms of laws that do not compete; `begun`: what has been selected for these rows
-    already; `first`: end with the first term.
     `in_slip`: what the rows in slip have shown, where those of the problem reach across reversals.
     Then only effects that act at reversals compete: all others have, where nothing hides them.
+    `refused`: forms of laws that do not compete; `begun`: what has been selected for these rows
+    already; `first`: end with the first term.
     """
     current, selected = _started(problem, in_slip)
     if begun is not None:
@@ -43,7 +44,8 @@ def select(
         round_ = contest(
             evidence, current, problem.candidate_set, seed,
             lambda effect: in_slip is None or effect.at_reversals,
-            lambda each: needed(each, current, evidence, problem.base, selected),  # noqa: B023
+            partial(needed, current=current, evidence=evidence, base=problem.base,
+                    selected=selected),
         )  # fmt: skip
         allowed = [f for f in round_.finalists if f.trial.candidate.form not in refused]
         round_ = constrained(round_._replace(finalists=allowed), current, evidence)
