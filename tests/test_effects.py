@@ -32,6 +32,7 @@ CASES = {
     "unbalance": (T.GravityUnbalance(0.14), (1.5, -0.8)),
     "cogging": (T.Cogging(0.012), (0.6, 1.2)),
     "cogging_3": (T.Cogging(0.012, 3), (0.6, 1.2, 0.3, -0.5, 0.2, 0.4)),
+    "force_ripple": (T.ForceRipple(0.012), (0.06, 0.03)),
     "spring": (T.Spring(0.01), (40.0,)),
     "hardening_spring": (T.HardeningSpring(0.005), (2e4,)),
     "end_stop": (T.EndStop(0.02), (80.0,)),
@@ -258,6 +259,7 @@ def test_a_stop_is_met_in_its_own_half_of_the_stroke():
 def test_values_by_hand():
     assert column(T.Cogging(0.01), at(x=0.0025)) == pytest.approx(1.0)
     assert column(T.Cogging(0.01, 2), at(x=0.00125), 2) == pytest.approx(1.0)
+    assert column(T.ForceRipple(0.01), at(x=0.0025, predicted_force=-5.0)) == pytest.approx(-5.0)
     assert column(T.Spring(0.5), at(x=2.0)) == 1.5
     assert column(T.HardeningSpring(1.0), at(x=3.0)) == 8.0
     assert [column(T.EndStop(1.0), at(x=x)) for x in (0.5, 1.5)] == [0.0, 0.5]

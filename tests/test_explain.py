@@ -202,6 +202,25 @@ def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
     assert errors["after"] < 0.8 * errors["before"]
 
 
+def test_ripple_of_the_force_constant_is_told_from_a_detent(healthy):
+    pitch, part = 0.01, 0.06
+    run, held = (
+        dataclasses.replace(
+            log,
+            force=log.force * (1 + part * jnp.sin(2 * np.pi * log.position / pitch)),
+        )
+        for log in healthy
+    )
+    found = explain(run, "gaussian", held)
+    assert [f.effect for f in found.findings] == ["cogging"] and found.findings[0].confirmed
+    finding = found.findings[0]
+    assert finding.parameters["ripple_sin"].unit == "1"
+    assert float(finding.parameters["amplitude"].value) == pytest.approx(part, rel=0.03)
+    assert float(finding.parameters["pitch"].value) == pytest.approx(pitch, rel=3e-3)
+    assert finding.sentence.startswith("The force differs from what is commanded by 0.0")
+    assert "force ripple" in finding.sentence
+
+
 @pytest.mark.slow
 def test_the_answer_does_not_depend_on_units_time_or_direction(healthy):
     term, alpha, beta = CASES["cogging"]

@@ -69,6 +69,7 @@ LAWS = {
         terms.Inertia() + terms.Gravity(0.7), step_time=-0.3, ramp=0.2
     ),
     "gain asymmetry": terms.GainAsymmetry(),
+    "force ripple": terms.ForceRipple(0.2),
     "dead-band": terms.ActuatorDeadband(),
     "saturation": terms.ActuatorSaturation(4.0),
     "load friction": terms.LoadDependentFriction(),

@@ -81,7 +81,7 @@ def _of_another(other: Finalist, best: Finalist) -> bool:
 def _line(finalist: Finalist, coordinate: str) -> bool:
     """Whether it is a wave over a coordinate alone."""
     lines = finalist.trial.candidate.lines
-    return lines is not None and lines.coordinate == coordinate and not lines.sided
+    return lines is not None and lines.coordinate == coordinate and not lines.factor
 
 
 def _force(finalist: Finalist, evidence) -> np.ndarray:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..signals import kernel
+from ..terms.effect import SIDE
 from .evidence import Evidence
 from .regression import Fit
 from .significance import LEVEL
@@ -28,12 +29,13 @@ class SpectralLines(NamedTuple):
 
     Over a kernel the coordinate is taken as a straight line; averaging then multiplies a wave by
     the kernel's Fourier transform at 2πf·rate·reach. `coordinate`: "position" or "time";
-    `inverse`: whether the parameter is a period; `sided`: times the direction; `harmonics`.
+    `inverse`: whether the parameter is a period; `factor`: what they are multiplied by, a channel in
+    the middle of a row, or `SIDE`, the direction; `harmonics`.
     """
 
     coordinate: str
     inverse: bool
-    sided: bool = False
+    factor: str = ""
     harmonics: int = 1
 
     def columns(self, evidence: Evidence, parameters: np.ndarray) -> np.ndarray:
@@ -44,18 +46,26 @@ class SpectralLines(NamedTuple):
         rate = np.asarray(evidence.motion.velocity)[evidence.centre]
         rate = rate if self.coordinate == "position" else np.ones_like(rate)
         swept = np.abs(2 * np.pi * evidence.reach * rate).astype(np.float32)
-        side = evidence.side.astype(np.float32) if self.sided else np.float32(1)
+        factor = self._factor(evidence)
         columns = np.empty((len(parameters), 2 * self.harmonics, len(value)), np.float32)
         for n in range(1, self.harmonics + 1):
             for some in range(0, len(parameters), AT_ONCE):
                 waves = n * frequency[some : some + AT_ONCE, None]
                 turned = angle(waves * value)
                 at = np.minimum(waves.astype(np.float32) * (20 * swept) + 0.5, len(_GAINS) - 1)
-                gain = _GAINS[at.astype(np.int32)] * side
+                gain = _GAINS[at.astype(np.int32)] * factor
                 out = columns[some : some + AT_ONCE, 2 * n - 2 : 2 * n]
                 np.multiply(gain, np.sin(turned), out=out[:, 0])
                 np.multiply(gain, np.cos(turned), out=out[:, 1])
         return columns.transpose(0, 2, 1)
+
+    def _factor(self, evidence: Evidence):
+        if not self.factor:
+            return np.float32(1)
+        if self.factor == SIDE:
+            return evidence.side.astype(np.float32)
+        values = np.asarray(evidence.motion.channels[self.factor])[evidence.centre]
+        return (values / max(float(np.max(np.abs(values))), 1e-300)).astype(np.float32)
 
 
 # Waves whose numbers stay in the cache while they are worked on.

@@ -13,7 +13,7 @@ from .effects.asymmetric_friction import (
     FrictionAsymmetry as FrictionAsymmetry,
 )
 from .effects.backlash import Backlash as Backlash, ElasticBacklash as ElasticBacklash
-from .effects.cogging import Cogging as Cogging
+from .effects.cogging import Cogging as Cogging, ForceRipple as ForceRipple
 from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance
 from .effects.cross_axis import CrossAxis as CrossAxis
 from .effects.disturbance_pulses import DisturbancePulses as DisturbancePulses

@@ -36,14 +36,17 @@ class View(NamedTuple):
 class Waves(NamedTuple):
     """A law that is a wave over a coordinate: its grid is the spectral lines of a recording.
 
-    `coordinate`: "position" or "time"; `inverse`: whether the parameter is a period; `sided`:
-    whether the wave changes its sign with the direction; `harmonics`.
+    `coordinate`: "position" or "time"; `inverse`: whether the parameter is a period; `factor`: what
+    the wave is multiplied by, the name of a channel, or `SIDE`, the direction; `harmonics`.
     """
 
     coordinate: str
     inverse: bool
-    sided: bool = False
+    factor: str = ""
     harmonics: int = 1
+
+
+SIDE = "side"
 
 
 class Residual(NamedTuple):

@@ -10,7 +10,7 @@ from ...units import (
     POSITION,
 )
 from ..base import AbstractLaw
-from ..effect import Effect, Waves, slowly
+from ..effect import SIDE, Effect, Waves, slowly
 from ..position import (
     WITH_DIRECTION,
     any_period,
@@ -53,7 +53,7 @@ POSITION_DEPENDENT_FRICTION = Effect(
     needs=frozenset({"position"}),
     confusable_with=("sticky_spot", "asymmetric_friction"),
     separate_by="Cross the stroke slowly, both ways.",
-    waves=lambda term: Waves("position", True, sided=True),
+    waves=lambda term: Waves("position", True, SIDE),
     variant=slowly(
         "friction_period",
         "Friction varies slowly along the stroke, by {amplitude}: it does not repeat within the "
