@@ -29,8 +29,8 @@ class SpectralLines(NamedTuple):
 
     Over a kernel the coordinate is taken as a straight line; averaging then multiplies a wave by
     the kernel's Fourier transform at 2πf·rate·reach. `coordinate`: "position" or "time";
-    `inverse`: whether the parameter is a period; `factor`: what they are multiplied by, a channel in
-    the middle of a row, or `SIDE`, the direction; `harmonics`.
+    `inverse`: whether the parameter is a period; `factor`: what they are multiplied by, a channel,
+    in the middle of a row, or `SIDE`, the direction; `harmonics`.
     """
 
     coordinate: str

@@ -1,4 +1,4 @@
-"""Force that repeats along the axis: a motor's detent and force ripple, the error of a screw or a gear."""
+"""Force that repeats along the axis: detent and force ripple of a motor, the error of a screw."""
 
 from collections.abc import Mapping
 from typing import ClassVar
