@@ -68,6 +68,7 @@ CASES = {
     "viscous_step": (T.ParameterStep(T.Viscous(), 6.3), (10.0,)),
     "inertia_ramp": (T.ParameterStep(T.Inertia(), 3.1, 0.2), (1.5,)),
     "friction_ramp": (T.FrictionStep(T.Viscous(), 6.3, 0.2), (10.0,)),
+    "friction_change": (T.FrictionRamp(T.Coulomb(), 6.3, 1.2), (1.5,)),
     "load_drift": (T.LoadDrift(0.0, 12.0, 3), (1.5, -1.0, 0.7)),
     "tone": (T.PeriodicDisturbance(3.7), (0.7, 0.9)),
     "pulses": (T.DisturbancePulses((2.2, 7.1), 0.2), (3.0, -3.0)),
@@ -275,6 +276,8 @@ def test_values_by_hand():
         2 * np.exp(-1)
     )
     assert [column(T.FrictionStep(T.Coulomb(), 1.0), at(t=t)) for t in (0.9, 1.1)] == [0.0, 1.0]
+    ramp = T.FrictionRamp(T.Coulomb(), 1.0, 0.4)
+    assert [column(ramp, at(t=t)) for t in (0.7, 1.0, 1.3)] == [0.0, 0.5, 1.0]
     assert column(T.LoadDrift(0.0, 2.0, 2), at(t=1.0), 1) == -0.5
     assert column(T.DisturbancePulses((1.0,), 0.5), at(t=1.25)) == pytest.approx(0.5)
 

@@ -222,6 +222,19 @@ def test_ripple_of_the_force_constant_is_told_from_a_detent(healthy):
 
 
 @pytest.mark.slow
+def test_friction_that_changes_gradually_is_a_step_with_a_duration(healthy):
+    term, values = terms.FrictionRamp(), {"step_time": 8.0, "step_duration": 2.5}
+    run, held = (planted(log, term, (3.0,), tuple(values.values())) for log in healthy)
+    found = explain(run, "gaussian", held)
+    assert [f.effect for f in found.findings] == ["friction_step"]
+    finding = found.findings[0]
+    for name, value in values.items():
+        low, high = finding.parameters[name].interval()
+        assert low < value < high and high - low < 0.5 * value
+    assert "in the course of 2." in finding.sentence
+
+
+@pytest.mark.slow
 def test_the_answer_does_not_depend_on_units_time_or_direction(healthy):
     term, alpha, beta = CASES["cogging"]
     run = planted(healthy[0], term, alpha, beta)

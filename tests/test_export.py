@@ -57,6 +57,7 @@ LAWS = {
     "warming": terms.ThermalDrift(terms.Viscous(), 0.6, start=-1.0),
     "step": terms.FrictionStep(terms.Coulomb(), 0.2),
     "ramp": terms.FrictionStep(terms.Coulomb(), 0.2, ramp=0.3),
+    "gradual": terms.FrictionRamp(terms.Coulomb(), 0.2, 0.5),
     "warming by direction": terms.ThermalDrift(Directional(terms.Coulomb()), 0.6),
     "directional": Directional(
         terms.Coulomb() + terms.Viscous() + terms.Gaussian(0.05),

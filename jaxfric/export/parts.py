@@ -182,9 +182,10 @@ def _lines(syntax: Syntax, term: AbstractTerm, affine, nonlinear) -> tuple[Line,
         pair = [(term.positive, "+"), (term.negative, "-")]
         return _sides(syntax, pair, affine, nonlinear)
     if isinstance(term, AbstractModulated):
-        factor = term.factor_text(syntax, identifier(nonlinear[0]))
+        own, inner = nonlinear[: len(term.of_time)], nonlinear[len(term.of_time) :]
+        factor = term.factor_text(syntax, *map(identifier, own))
         if factor is not None:
-            inner = _lines(syntax, term.term, affine, nonlinear[1:])
+            inner = _lines(syntax, term.term, affine, inner)
             return tuple(line._replace(column=f"{factor} * ({line.column})") for line in inner)
     columns = term.text(syntax, *map(identifier, nonlinear))
     if columns is None:

@@ -35,6 +35,7 @@ from .effects.position_dependent_inertia import (
 from .effects.presliding import Dahl as Dahl, LuGre as LuGre
 from .effects.springs import HardeningSpring as HardeningSpring, Spring as Spring
 from .effects.steps import (
+    FrictionRamp as FrictionRamp,
     FrictionStep as FrictionStep,
     GainStep as GainStep,
     PayloadChange as PayloadChange,

@@ -13,14 +13,14 @@ from .text import Syntax
 
 
 class AbstractModulated(AbstractTerm):
-    """A force law times a factor of time with one nonlinear parameter; `term` is the law.
+    """A force law times a factor of time; `term` is the law.
 
-    A concrete class names its parameter in `parameter`, the field of the same name, gives the
-    `prefix` for the affine parameters, and `factor(time)`.
+    A concrete class names the factor's nonlinear parameters in `of_time`, with fields of the same
+    names, gives the `prefix` for the affine parameters, and `factor(time)`.
     """
 
     term: eqx.AbstractVar[AbstractTerm]
-    parameter: eqx.AbstractClassVar[Parameter]
+    of_time: eqx.AbstractClassVar[tuple[Parameter, ...]]
     prefix: eqx.AbstractClassVar[str]
 
     def __check_init__(self):
@@ -34,8 +34,8 @@ class AbstractModulated(AbstractTerm):
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
         """The factor at each time, s, dimensionless."""
 
-    def factor_text(self, s: Syntax, name: str) -> str | None:
-        """The factor in a language, of the parameter's name; `None` where it has no text."""
+    def factor_text(self, s: Syntax, *names: str) -> str | None:
+        """The factor in a language, of its parameters' names; `None` where it has no text."""
         return None
 
     @property
@@ -45,7 +45,7 @@ class AbstractModulated(AbstractTerm):
     @property
     def nonlinear(self):
         inner = (p._replace(name=f"{self.prefix}_{p.name}") for p in self.term.nonlinear)
-        return (self.parameter, *inner)
+        return (*self.of_time, *inner)
 
     @property
     def coordinates(self):
@@ -65,10 +65,11 @@ class AbstractModulated(AbstractTerm):
         return jnp.zeros_like(recording.time)
 
     def beta(self) -> Float[Array, " d"]:
-        own = vector([getattr(self, self.parameter.name)])
+        own = vector([getattr(self, parameter.name) for parameter in self.of_time])
         return joined([own, self.term.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "AbstractModulated":
-        name = self.parameter.name
-        where = lambda term: (getattr(term, name), term.term)  # noqa: E731
-        return eqx.tree_at(where, self, (beta[0], self.term.with_beta(beta[1:])))
+        names = [parameter.name for parameter in self.of_time]
+        where = lambda term: (*(getattr(term, name) for name in names), term.term)  # noqa: E731
+        own, inner = beta[: len(names)], beta[len(names) :]
+        return eqx.tree_at(where, self, (*own, self.term.with_beta(inner)))

@@ -38,6 +38,7 @@ def _within(scales):
 # Two dates of a step differ by what lies between them only: the cost is no parabola but a wedge,
 # and a date is refined within a step of the grid.
 _MOMENTS = Resolution(1, 256, None, 256)
+STEP_TIME = Parameter("step_time", TIME, _within, logarithmic=False, resolution=_MOMENTS)
 
 
 class FrictionStep(AbstractModulated):
@@ -50,9 +51,7 @@ class FrictionStep(AbstractModulated):
     term: AbstractTerm = Coulomb()
     step_time: Float[Array, ""] | float = UNKNOWN
     ramp: float = eqx.field(static=True, default=0.0)
-    parameter: ClassVar = Parameter(
-        "step_time", TIME, _within, logarithmic=False, resolution=_MOMENTS
-    )
+    of_time: ClassVar = (STEP_TIME,)
     prefix: ClassVar = "step"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
@@ -72,15 +71,60 @@ class FrictionStep(AbstractModulated):
         return super().extent(values) | _about(values["step_time"], self.ramp)
 
 
+# A step in friction cannot be dated better than to about one kernel of the weak form, some
+# thousandths of the record.
+RAMP_SHARE = 0.005
+
+
+def _durations(scales):
+    """From what is a step to a quarter of the record: what takes longer is a drift."""
+    return RAMP_SHARE * scales.duration, 0.25 * scales.duration
+
+
+class FrictionRamp(AbstractModulated):
+    """Friction that changes from one level to another in some time: F = ΔF g(v) φ(t), g the law
+    `term`; φ rises in a straight line from 0 to 1 over T about t_c.
+
+    `step_time` t_c and `step_duration` T, s. [`FrictionStep`][] is the same at once.
+    """
+
+    term: AbstractTerm = Coulomb()
+    step_time: Float[Array, ""] | float = UNKNOWN
+    step_duration: Float[Array, ""] | float = UNKNOWN
+    of_time: ClassVar = (
+        STEP_TIME,
+        Parameter("step_duration", TIME, _durations, resolution=Resolution(0, 2, None, 16)),
+    )
+    prefix: ClassVar = "step"
+
+    def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
+        return jnp.clip((time - self.step_time) / self.step_duration + 0.5, 0.0, 1.0)
+
+    def factor_text(self, s, moment, duration):
+        return s.clip(f"(t - {moment}) / {duration} + 0.5", "0.0", "1.0")
+
+    @property
+    def switched(self):
+        return None if self.term.nonlinear else self.term
+
+    def course(self, betas, time):
+        return _course(betas[:, 1:2], betas, time)
+
+    def extent(self, values):
+        return super().extent(values) | _about(values["step_time"], values["step_duration"])
+
+
 def _about(moment: float, ramp: float) -> dict[str, tuple[float, float]]:
     half = ramp or 1.0
     return {"time": (moment - half, moment + half)}
 
 
-def _course(ramp: float, betas: np.ndarray, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _course(
+    ramp: float | np.ndarray, betas: np.ndarray, time: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The step and its rate at each time, for the moments in the first column of `betas`."""
     late = time[None, :] - betas[:, :1]
-    if ramp == 0:
+    if np.all(ramp == 0):
         return np.where(late > 0, 1.0, 0.0), np.zeros_like(late)
     inside = np.abs(late) < 0.5 * ramp
     return np.clip(late / ramp + 0.5, 0.0, 1.0), np.where(inside, 1 / ramp, 0.0)
@@ -124,7 +168,7 @@ class AbstractChange(AbstractTerm):
 
     @property
     def nonlinear(self):
-        return (FrictionStep.parameter,)
+        return (STEP_TIME,)
 
     @property
     def coordinates(self):
@@ -199,7 +243,7 @@ class GainStep(AbstractLaw):
     step_time: Float[Array, ""] | float = UNKNOWN
     ramp: float = eqx.field(static=True, default=0.0)
     affine: ClassVar = (Parameter("step_gain", DIMENSIONLESS),)
-    nonlinear: ClassVar = (FrictionStep.parameter,)
+    nonlinear: ClassVar = (STEP_TIME,)
     coordinates: ClassVar = frozenset({"time", PREDICTED})
 
     def law(self, sample: Sample):
@@ -209,9 +253,6 @@ class GainStep(AbstractLaw):
         return (f"{_stepped_text(self, s, names[0])} * f",)
 
 
-# A step in friction cannot be dated better than to about one kernel of the weak form, some
-# thousandths of the record.
-RAMP_SHARE = 0.005
 # Machines whose mass or gain changes while they run are not drawn: of a seed of `prove` every case
 # stays what it was before these effects.
 
@@ -226,18 +267,42 @@ def moments(term: AbstractTerm, view: View) -> np.ndarray:
     return even(term, view, 8 * GRID)
 
 
+def _changes(term: FrictionStep | FrictionRamp, view: View) -> np.ndarray:
+    """Dates; of ramps a third of their duration apart, for durations an octave apart."""
+    if isinstance(term, FrictionStep):
+        return moments(term, view)
+    shares = 2.0 ** -np.arange(2.5, 7.0)
+    low, high = (float(end) for end in _within(view.limits))
+    pairs = [
+        (moment, share * float(view.limits.duration))
+        for share in shares
+        for moment in np.linspace(low, high, 2 + int(3 / share))
+    ]
+    return np.array(pairs)
+
+
+def _gradual(values: Mapping[str, float], extent: Extent) -> str | None:
+    if "step_duration" not in values:
+        return None
+    return (
+        "Coulomb friction changes by {step_coulomb} in the course of {step_duration}, about "
+        "t = {step_time}"
+    )
+
+
 FRICTION_STEP = Effect(
     "friction_step",
     "ΔF sign(v) 1(t > t_c)",
     "time",
     "At t = {step_time} Coulomb friction changes by {step_coulomb}",
-    laws=(FrictionStep,),
-    scaled=lambda scales: (FrictionStep(Coulomb(), ramp=ramp(scales)),),
+    laws=(FrictionStep, FrictionRamp),
+    scaled=lambda scales: (FrictionStep(Coulomb(), ramp=ramp(scales)), FrictionRamp()),
     coordinates=("time_by_direction",),
     confusable_with=("thermal_drift",),
     separate_by="Repeat from cold: warming repeats, a step does not.",
     momentary=True,
-    grid=moments,
+    grid=_changes,
+    variant=_gradual,
     moment="step_time",
 )
 

@@ -35,7 +35,7 @@ class ThermalDrift(AbstractModulated):
     term: AbstractTerm = Viscous()
     time_constant: Float[Array, ""] | float = UNKNOWN
     start: float = eqx.field(static=True, default=0.0)
-    parameter: ClassVar = Parameter("time_constant", TIME, _constant_bounds)
+    of_time: ClassVar = (Parameter("time_constant", TIME, _constant_bounds),)
     prefix: ClassVar = "thermal"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
