@@ -46,7 +46,7 @@ from jaxfric.explanation import (
     verification,
 )
 from jaxfric.explanation.finding import Finding
-from jaxfric.explanation.inputs import straight
+from jaxfric.explanation.inputs import updated
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
@@ -170,16 +170,16 @@ def test_friction_of_a_recorded_load_is_told_by_that_load(healthy):
     assert found.findings[0].confirmed
 
 
-def test_a_position_that_is_held_between_updates_is_taken_as_straight(healthy):
+def test_a_position_that_is_held_between_updates_is_a_curve_through_them(healthy):
     position = np.asarray(healthy[0].position)
     seldom = dataclasses.replace(
         healthy[0], position=jnp.asarray(position[np.arange(position.size) // 4 * 4])
     )
-    fresh, remarks = straight(seldom)
+    fresh, remarks = updated(seldom)
     assert [r.name for r in remarks] == ["position_held"] and "every 4 samples" in remarks[0].text
     stairs = np.std(np.asarray(seldom.position) - position)
     assert np.std(np.asarray(fresh.position) - position) < 0.05 * stairs
-    assert straight(healthy[0]) == (healthy[0], [])
+    assert updated(healthy[0]) == (healthy[0], [])
 
 
 @pytest.mark.slow

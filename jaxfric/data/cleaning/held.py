@@ -23,12 +23,28 @@ def held_for(position: np.ndarray) -> int:
 def between_updates(
     time: np.ndarray, position: np.ndarray, segment: np.ndarray, every: int
 ) -> np.ndarray:
-    """The position straight between its updates, each of which is right when it comes."""
+    """The position by cubics through its updates, each of which is right when it comes.
+
+    With the slopes of parabolas through three (Catmull & Rom 1974). Straight lines err by (ωT)²/8
+    of a wave, with 15 updates T a cycle by a fiftieth, and their bends look like forces.
+    """
     first = int(np.flatnonzero(np.diff(position) != 0)[0] + 1) % every
     found = np.array(position, float)
     for span in spans(segment):
         start, stop = span.start, span.stop
         fresh = np.arange(start + (first - start) % every, stop, every)
         if len(fresh) > 1:
-            found[span] = np.interp(time[span], time[fresh], position[fresh])
+            clock = time[span] if np.all(np.diff(time[span]) > 0) else np.arange(start, stop)
+            found[span] = _through(clock[fresh - start], found[fresh], clock)
     return found
+
+
+def _through(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Cubics through values at times, `(n,)`, at others, `(m,)`; constant beyond the ends."""
+    slope = np.gradient(values, time, edge_order=min(2, len(time) - 1))
+    left = np.clip(np.searchsorted(time, wanted, "right") - 1, 0, len(time) - 2)
+    span = time[left + 1] - time[left]
+    u = np.clip((wanted - time[left]) / span, 0.0, 1.0)
+    rise = values[left + 1] - values[left]
+    first, last = span * slope[left] - rise, rise - span * slope[left + 1]
+    return values[left] + u * rise + u * (1 - u) * ((1 - u) * first + u * last)
