@@ -596,6 +596,7 @@ SEARCHED = {
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("healthy", RATES[:1], indirect=True)
 @pytest.mark.parametrize("name", SEARCHED)
 def test_identify_finds_the_nonlinear_parameters_too(healthy, name):
     term, alpha = CASES[name]

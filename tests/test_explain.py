@@ -202,6 +202,7 @@ def test_what_is_missing_is_named_with_its_parameters(healthy, effect):
     assert errors["after"] < 0.8 * errors["before"]
 
 
+@pytest.mark.slow
 def test_ripple_of_the_force_constant_is_told_from_a_detent(healthy):
     pitch, part = 0.01, 0.06
     run, held = (
@@ -219,6 +220,16 @@ def test_ripple_of_the_force_constant_is_told_from_a_detent(healthy):
     assert float(finding.parameters["pitch"].value) == pytest.approx(pitch, rel=3e-3)
     assert finding.sentence.startswith("The force differs from what is commanded by 0.0")
     assert "force ripple" in finding.sentence
+
+
+@pytest.mark.slow
+def test_a_bump_that_falls_over_decades_of_the_speed_is_a_stribeck_bump(healthy):
+    bump = terms.Generalised(0.02, 0.5)
+    runs = [planted(log, bump, (8.0,)) for log in healthy]
+    found = explain(runs[0], "coulomb-viscous", runs[1])
+    assert [f.effect for f in found.findings] == ["stribeck"]
+    # Beside the Gaussian one that the machine has, of 6 N and exponent 2.
+    assert float(found.findings[0].parameters["stribeck_exponent+"].value) < 1.0
 
 
 @pytest.mark.slow

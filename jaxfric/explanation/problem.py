@@ -15,6 +15,7 @@ from .predictions import with_predictions
 from .regression import Fit, fit
 from .reversals import creeps, yields
 from .significance import blocks
+from .threads import each
 
 # Alignments that differ by less than this part of a sample make no difference worth another search.
 ALIGNED = 0.1
@@ -199,15 +200,18 @@ def _lateness(kernels: list[Evidence], known: Fit) -> float:
     no fault; what is beyond is left to be found. Where the two kernels differ, the wider one
     decides, since noise of the encoder moves the narrow one only.
     """
-    sample, delays = kernels[0].limits.interval, []
+    sample = kernels[0].limits.interval
     index = [i for i, term in enumerate(known.terms) if not traits(term).delays]
     terms, betas = [known.terms[i] for i in index], [known.betas[i] for i in index]
-    for evidence in kernels:
+
+    def late(evidence: Evidence) -> float:
         seen = with_predictions(evidence, known)
         current = fit(terms, seen, betas, 6)
         seen = with_predictions(seen, current)
         column = seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
         basis = current.basis()
         column = column - basis @ (basis.T @ column)
-        delays.append(float(column @ current.residual / max(column @ column, 1e-300)))
+        return float(column @ current.residual / max(column @ column, 1e-300))
+
+    delays = each(late, kernels)
     return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..terms.effects import EFFECTS
+from . import threads
 from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY
 from .bins import unit
 from .evidence import Evidence
@@ -24,11 +25,12 @@ def before_and_after(
 ) -> tuple[list[Structure], list[Structure]]:
     """Where the baseline's residual has structure, and where that of the findings has."""
     problem = better.findings.problem
-    before = _shown(better.first, problem, problem, LEAST_SHARE, seed)
-    if not better.findings.selection.selected and wrong is None:
-        return before, []
     undelayed, selection = better.findings.undelayed
-    return before, _shown(selection.last, undelayed, problem, LATER_SHARE, seed)
+    fits = [(better.first, problem, LEAST_SHARE)]
+    if better.findings.selection.selected or wrong is not None:
+        fits.append((selection.last, undelayed, LATER_SHARE))
+    before, *after = threads.each(lambda one: _shown(*one[:2], problem, one[2], seed), fits)
+    return before, after[0] if after else []
 
 
 def _shown(

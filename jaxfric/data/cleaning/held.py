@@ -41,7 +41,7 @@ def between_updates(
 
 def _through(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Cubics through values at times, `(n,)`, at others, `(m,)`; constant beyond the ends."""
-    slope = np.gradient(values, time, edge_order=min(2, len(time) - 1))
+    slope = np.gradient(values, time, edge_order=2 if len(time) > 2 else 1)
     left = np.clip(np.searchsorted(time, wanted, "right") - 1, 0, len(time) - 2)
     span = time[left + 1] - time[left]
     u = np.clip((wanted - time[left]) / span, 0.0, 1.0)

@@ -1,22 +1,39 @@
 """Friction that falls with speed."""
 
+import numpy as np
+
 from ..base import Directional
-from ..effect import Effect
+from ..effect import GRID, Effect, View, even, inside
 from ..friction import Exponential, Gaussian, Generalised, Lorentzian
+
+# Exponents of a bump beside those that have a law of their own, 1 and 2: from 1/2 on (Bo &
+# Pavelescu 1982) such bumps fall over decades of the speed.
+_EXPONENTS = (0.5, 0.7)
+
+
+def bumps(term: Directional, view: View) -> np.ndarray:
+    """Speeds, the same for both directions, with a few exponents where they are free."""
+    if not isinstance(term.positive, Generalised):
+        return even(term, view)
+    along = (np.arange(GRID) + 0.5) / GRID
+    speeds = inside(Directional(Exponential()), view.limits, np.repeat(along[:, None], 2, axis=1))
+    return np.array([(v, n, v, n) for n in _EXPONENTS for v in speeds[:, 0]])
+
 
 STRIBECK = Effect(
     "stribeck",
-    "F_b sign(v) exp(−(v/v_s)²), 1/(1 + (v/v_s)²) or exp(−abs(v)/v_s)",
+    "F_b sign(v) exp(−(v/v_s)²), 1/(1 + (v/v_s)²), exp(−abs(v)/v_s) or exp(−abs(v/v_s)^δ)",
     "friction",
     "Friction falls with speed at low velocity: a Stribeck bump of {stribeck_force+} forward and "
     "{stribeck_force-} backward, over {stribeck_velocity+} and {stribeck_velocity-}",
     laws=(Gaussian, Lorentzian, Exponential, Generalised),
     scaled=lambda scales: tuple(
-        Directional(bump()) for bump in (Gaussian, Lorentzian, Exponential)
+        Directional(bump()) for bump in (Gaussian, Lorentzian, Exponential, Generalised)
     ),
     coordinates=("velocity",),
     confusable_with=("presliding", "frictional_lag", "viscous_nonlinearity"),
     separate_by="Hold several constant slow speeds: a Stribeck curve stays, a transient goes.",
     positive=True,
+    grid=bumps,
     sizes=("stribeck_force",),
 )
