@@ -289,8 +289,13 @@ def test_any_term_is_found_from_the_default_bounds(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("base", ["gaussian", "lorentzian", "generalised", "symmetric-exponential"])
-@pytest.mark.parametrize("name", ["cogging", "sticky_spot", "dahl", "friction_ramp"])
+@pytest.mark.parametrize(
+    "base, name",
+    [
+        ("gaussian", "cogging"), ("lorentzian", "sticky_spot"), ("generalised", "dahl"),
+        ("symmetric-exponential", "friction_ramp"),
+    ],
+)  # fmt: skip
 def test_any_model_is_found_beside_a_further_term(base, name):
     found, model = found_again(name, models.named(base), noise=0.2)
     assert not misses(found, model, share=0.05)
