@@ -268,15 +268,17 @@ def moments(term: AbstractTerm, view: View) -> np.ndarray:
 
 
 def _changes(term: FrictionStep | FrictionRamp, view: View) -> np.ndarray:
-    """Dates; of ramps a third of their duration apart, for durations an octave apart."""
+    """Dates; of ramps two thirds of their duration apart, for durations an octave apart, down to
+    where a step and its refinement do.
+    """
     if isinstance(term, FrictionStep):
         return moments(term, view)
-    shares = 2.0 ** -np.arange(2.5, 7.0)
+    shares = 2.0 ** -np.arange(2.5, 6.0)
     low, high = (float(end) for end in _within(view.limits))
     pairs = [
         (moment, share * float(view.limits.duration))
         for share in shares
-        for moment in np.linspace(low, high, 2 + int(3 / share))
+        for moment in np.linspace(low, high, 2 + int(1.5 / share))
     ]
     return np.array(pairs)
 
