@@ -215,6 +215,18 @@ def test_vmap_and_jit_agree_with_a_plain_call():
     np.testing.assert_allclose(jax.jit(cost)(log.force), cost(log.force), rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "term, told",
+    [
+        (jf.terms.GainAsymmetry(), "Identify the rest; jaxfric.explain finds such faults"),
+        (jf.terms.LoadDependentFriction("load"), "needs load, which the recording lacks; it has"),
+    ],
+)
+def test_a_signal_that_a_term_needs_and_is_not_there_is_said(term, told):
+    with pytest.raises(ValueError, match=told):
+        jf.identify(jf.models.coulomb_viscous() + term, recording(machine(), seconds=2.0))
+
+
 @pytest.mark.slow
 def test_bounds_hold_and_the_border_is_reported():
     log = recording(machine(), noise=0.05)

@@ -10,6 +10,7 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording, described
 from ..models import Model, named
+from ..terms.actuator import PREDICTED
 from ..terms.base import AbstractTerm
 from . import blocks, grids
 from .identified import Identified
@@ -132,10 +133,17 @@ def _check(term, projection, recording):
         )
     missing = {"position"} & beyond if recording.position is None else set()
     missing |= {c for c in beyond if c not in ("position", "time") and c not in recording.channels}
+    if PREDICTED in missing:
+        raise ValueError(
+            "The model holds a term of the force that the motion needs, as faults of an actuator "
+            "are, and the recording does not hold that. Identify the rest; jaxfric.explain finds "
+            "such faults beside it."
+        )
     if missing:
+        place = [] if recording.position is None else ["position"]
         raise ValueError(
             f"The model needs {', '.join(sorted(missing))}, which the recording lacks; "
-            f"it has {', '.join(['time', 'velocity', *recording.channels])}."
+            f"it has {', '.join(['time', *place, 'velocity', *recording.channels])}."
         )
 
 
