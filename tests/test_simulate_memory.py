@@ -1,5 +1,7 @@
 """Forward in time with a memory: loads on a spring, gaps, friction that lags behind velocity."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -8,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import jaxfric as jf
 from jaxfric import terms
+from jaxfric.simulation import prediction
 from jaxfric.simulation.prediction import in_motion
 from jaxfric.simulation.simulating import default_substeps
 from jaxfric.terms.base import Sum, summands
@@ -132,6 +135,17 @@ def test_it_does_so_in_single_precision(case):
     assert run.position.dtype == jnp.float32
     of_force, of_effect = disagreement(model, run)
     assert of_force < 0.02 and of_effect < 1 / 8
+
+
+def test_a_load_that_swings_faster_than_the_acceleration_is_known_is_smoothed_with_it(monkeypatch):
+    model, time = dry(110.0, 0.05, 6.0), np.arange(6000) * 1e-3
+    place = 0.05 * np.sin(4.4 * time) + 0.02 * np.sin(12 * time + 1)
+    wanted = jf.Recording(time, 0 * time, place)
+    run = jf.simulate(model, wanted, jf.PD(18000.0, 600.0), encoder=jf.Encoder(1e-6))
+    seen = dataclasses.replace(run, velocity=None)
+    error = prediction.force_error(model, seen)
+    monkeypatch.setattr(prediction.Prepared, "smoothed", lambda self, push: push)
+    assert error < 0.8 * prediction.force_error(model, seen)
 
 
 STEP = 1e-3

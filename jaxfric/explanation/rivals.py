@@ -1,5 +1,7 @@
 """Which of several candidates that fit alike is selected, and which cannot be told from it."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .contest import RIVAL, Contest, Finalist
@@ -32,9 +34,11 @@ ALIKE = 0.95
 
 
 def with_rivals(
-    best: Finalist, round_: Contest, current: Fit, evidence
+    best: Finalist, round_: Contest, current: Fit, evidence, besides: Sequence[Finalist] = ()
 ) -> tuple[Finalist, tuple[str, ...], tuple[str, ...]]:
     """The best, the effects that cannot be told from it, and of its own effect the parameters.
+
+    `besides`: finalists that cannot be selected.
 
     Of a line in position and one in time, which are the same at constant speed, the one in position
     is selected: a machine has more pitches than clocks.
@@ -42,7 +46,7 @@ def with_rivals(
     basis, force = current.basis(), _force(best, evidence)
     force = force - basis @ (basis.T @ force)
     alike = []
-    for other in round_.finalists:
+    for other in [*round_.finalists, *besides]:
         if other.effect.name == best.effect.name and not _of_another(other, best):
             continue
         theirs = _force(other, evidence)
@@ -61,11 +65,15 @@ def with_rivals(
     own = best.effect.name
     names = [f.effect.name for f, _ in alike if f.effect.name != own]
     instead = [_parameter(f) for f, _ in alike if f.effect.name == own]
-    twin = [f for f, same in alike if same and _line(f, "position")]
+    twin = [f for f, same in alike if same and _line(f, "position") and _may_be(f, round_)]
     if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
         best = twin[0]
         names = [own, *(name for name in names if name != best.effect.name)]
     return best, tuple(dict.fromkeys(names)), tuple(dict.fromkeys(instead))
+
+
+def _may_be(finalist: Finalist, round_: Contest) -> bool:
+    return any(each is finalist for each in round_.finalists)
 
 
 def _parameter(finalist: Finalist) -> str:

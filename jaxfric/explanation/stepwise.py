@@ -32,14 +32,15 @@ def select(
 
     `in_slip`: what the rows in slip have shown, where those of the problem reach across reversals.
     Then only effects that act at reversals compete: all others have, where nothing hides them.
-    `refused`: forms of laws that do not compete; `begun`: what has been selected for these rows
-    already; `first`: end with the first term.
+    `refused`: forms of laws that do not compete, since beside the rows the model with them is
+    worse; what fits the rows as they do cannot be told from them, though. `begun`: what has been
+    selected for these rows already; `first`: end with the first term.
     """
     current, selected = _started(problem, in_slip)
     if begun is not None:
         current, selected = begun.last, begun.selected
     evidence, known = with_predictions(problem.evidence, current), len(selected)
-    visited = set[Hashable]()
+    visited, nothing = set[Hashable](), set[Hashable]()
     while True:
         round_ = contest(
             evidence, current, problem.candidate_set, seed,
@@ -47,21 +48,26 @@ def select(
             partial(needed, current=current, evidence=evidence, base=problem.base,
                     selected=selected),
         )  # fmt: skip
+        there = [f for f in round_.finalists if f.trial.candidate.form not in nothing]
+        round_ = constrained(round_._replace(finalists=there), current, evidence)
+        spoiling = [f for f in round_.finalists if f.trial.candidate.form in refused]
         allowed = [f for f in round_.finalists if f.trial.candidate.form not in refused]
-        round_ = constrained(round_._replace(finalists=allowed), current, evidence)
+        round_ = round_._replace(finalists=allowed)
         best = accepted(round_, current, evidence, problem.wide_kernels, problem.base, selected)
         # Two terms that make each other idle would take turns for ever.
-        names = *sorted(each.effect.name for each in selected), len(refused)
+        names = *sorted(each.effect.name for each in selected), len(nothing)
         if best is None or len(selected) >= MOST_TERMS or names in visited:
             break
         visited.add(names)
-        best, rivals, instead = with_rivals(simplest(best, round_), round_, current, evidence)
+        best, rivals, instead = with_rivals(
+            simplest(best, round_), round_, current, evidence, spoiling
+        )
         current, evidence = joined(best, current, evidence)
         trial = with_own_term(best.trial, current)
         selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
         current, selected = _pruned(evidence, current, selected, round_.size)
         for number in nil(current, len(selected), evidence, problem.wide):
-            refused |= {selected[number].form}
+            nothing.add(selected[number].form)
             current = without(current, evidence, len(current.terms) - len(selected) + number)
             selected = [each for i, each in enumerate(selected) if i != number]
         if first and selected:

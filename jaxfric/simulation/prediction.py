@@ -17,6 +17,7 @@ from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
+from ..terms.presliding import AbstractStates, starts
 
 # So many samples are predicted together.
 BLOCK = 1 << 16
@@ -30,7 +31,9 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
     to break-away, the value is that of the terms at rest. A
     [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
-    first order. NaN where a parameter counts that the model has no value for.
+    first order. What a load pushes that is stepped along the motion (`DryCompliance`,
+    `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings; not inside jit.
+    NaN where a parameter counts that the model has no value for.
     """
     require_model(model, "predict")
     require(recording, "predict")
@@ -65,6 +68,18 @@ class Prepared:
         both = self._slope, signals.choose(self.recording, order=2)
         return max(both, key=lambda each: each.half_width)
 
+    def smoothed(self, signal: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        """A signal as smooth as the acceleration, outside jit: each derivative by which that was
+        taken, of the signal's integral.
+        """
+        log = self.recording
+        steps = np.where(starts(log), 0.0, np.diff(np.asarray(log.time, float), prepend=0.0))
+        for choice in filter(None, (self._slope, self.choice)):
+            mean = 0.5 * (signal + np.concatenate([signal[:1], signal[:-1]]))
+            whole = np.cumsum(mean * steps)
+            signal = signals.derivative(log, whole, choice.half_width, choice.degree)
+        return signal
+
 
 def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
@@ -74,7 +89,27 @@ def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
         momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
     rate = _rate(momentum(prepared), prepared, motion)
-    return _later(prepared, force(prepared) + rate, delay)
+    found = force(prepared) + rate
+    if not signals.is_traced(prepared):
+        found = found + _smoothed_pushes(model, prepared, motion)
+    return _later(prepared, found, delay)
+
+
+def _smoothed_pushes(model: Model, prepared: Recording, motion: Prepared) -> np.ndarray | float:
+    """What smoothing takes of the pushes of loads that are stepped along the motion, N, `(N,)`.
+
+    A load that swings swings the motor. Of that the derivative of the motor's momentum holds what
+    it does not smooth, so that of the load's push as much has to be left.
+    """
+    found: np.ndarray | float = 0.0
+    for part, alpha in zip(summands(model.term), model.alphas(), strict=True):
+        if isinstance(part, AbstractStates) and part.stepped:
+            # But for the friction that it takes from the motor: that jumps as the motor's own does.
+            side = np.sign(np.asarray(prepared.velocity, float))[:, None]
+            friction = side * np.asarray(part.relief, float)[None, :]
+            push = (np.asarray(part.columns(prepared), float) + friction) @ np.asarray(alpha, float)
+            found = found + (motion.smoothed(push) - push).astype(prepared.time.dtype)
+    return found
 
 
 def _by_samples(model: Model) -> bool:
