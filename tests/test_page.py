@@ -281,6 +281,15 @@ def test_an_unseen_parameter_is_no_number():
     assert coulomb.products == ("20 · sign v, v > 0", "+ ? · sign v, v < 0")
 
 
+def test_a_page_says_what_f_is_where_a_formula_reads_it():
+    known = jf.models.from_parameters(jf.terms.Coulomb() + jf.terms.Viscous(), {
+        "coulomb": 2.0, "viscous": 3.0,
+    })  # fmt: skip
+    fault = jf.models.Model(known.term + jf.terms.GainAsymmetry(), np.array([2.0, 3.0, 0.1]))
+    assert equations.of_the_force(equations.rows(fault))
+    assert not equations.of_the_force(equations.rows(known))
+
+
 def test_a_term_with_a_memory_is_given_by_its_law():
     lugre = jf.terms.Dahl()
     names = [p.name for p in (*lugre.affine, *lugre.nonlinear)]

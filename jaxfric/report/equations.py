@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from ..export.parts import Line, Part, lines, parts
@@ -35,6 +36,11 @@ def rows(model: Model) -> list[Row]:
     whole = model.with_parameters(dict.fromkeys(lacking, 1.0)) if lacking else model
     values = {identifier(n): "?" if n in lacking else _short(v) for n, v in known.items()}
     return [_row(part, values) for part in parts(whole)]
+
+
+def of_the_force(terms: Iterable[Row]) -> bool:
+    """Whether a product reads the force f that the motion needs."""
+    return any(re.search(r"\bf\b", product) for row in terms for product in row.products)
 
 
 def _row(part: Part, values: dict[str, str]) -> Row:
