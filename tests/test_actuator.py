@@ -17,7 +17,7 @@ AXIS = {"inertia": 2.0, "coulomb+": 5.0, "coulomb-": 6.0, "viscous+": 10.0, "vis
 FAULTS = {
     "gain asymmetry": (terms.GainAsymmetry(), {"gain_asymmetry": 0.2}),
     "lower gain": (terms.GainAsymmetry(), {"gain_asymmetry": -0.4}),
-    "force ripple": (terms.ForceRipple(0.01), {"ripple_sin": 0.1, "ripple_cos": -0.05}),
+    "force ripple": (terms.ForceRipple(), {"pitch": 0.04, "ripple_sin": 0.1, "ripple_cos": -0.05}),
     "dead-band": (terms.ActuatorDeadband(), {"deadband": 2.0}),
     "saturation": (terms.ActuatorSaturation(), {"saturation": 0.3, "knee": 8.0}),
     "load friction": (terms.LoadDependentFriction(), {"load_friction": 0.1}),
