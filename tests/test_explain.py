@@ -46,7 +46,7 @@ from jaxfric.explanation import (
     verification,
 )
 from jaxfric.explanation.finding import Finding
-from jaxfric.explanation.inputs import updated
+from jaxfric.explanation.inputs import interpolated
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
@@ -175,11 +175,11 @@ def test_a_position_that_is_held_between_updates_is_a_curve_through_them(healthy
     seldom = dataclasses.replace(
         healthy[0], position=jnp.asarray(position[np.arange(position.size) // 4 * 4])
     )
-    fresh, remarks = updated(seldom)
+    fresh, remarks = interpolated(seldom)
     assert [r.name for r in remarks] == ["position_held"] and "every 4 samples" in remarks[0].text
     stairs = np.std(np.asarray(seldom.position) - position)
     assert np.std(np.asarray(fresh.position) - position) < 0.05 * stairs
-    assert updated(healthy[0]) == (healthy[0], [])
+    assert interpolated(healthy[0]) == (healthy[0], [])
 
 
 @pytest.mark.slow

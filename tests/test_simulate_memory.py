@@ -144,8 +144,20 @@ def test_a_load_that_swings_faster_than_the_acceleration_is_known_is_smoothed_wi
     run = jf.simulate(model, wanted, jf.PD(18000.0, 600.0), encoder=jf.Encoder(1e-6))
     seen = dataclasses.replace(run, velocity=None)
     error = prediction.force_error(model, seen)
-    monkeypatch.setattr(prediction.Prepared, "smoothed", lambda self, push: push)
+    monkeypatch.setattr(prediction, "_smoothed", lambda push, *motion: push)
     assert error < 0.8 * prediction.force_error(model, seen)
+
+
+@pytest.mark.parametrize("case", ["dry", "flanks"])
+def test_a_prediction_with_a_load_differentiates_by_the_model(case):
+    model, time = CASES[case], np.arange(1500) * 1e-3
+    log = jf.Recording(time, 0 * time, 0.05 * np.sin(4.4 * time))
+
+    def size(scale):
+        return jnp.sum(jf.predict(dataclasses.replace(model, alpha=scale * model.alpha), log) ** 2)
+
+    # The force is proportional to alpha, and its sum of squares to the square of that.
+    assert float(jax.grad(size)(1.0)) == pytest.approx(2 * float(jax.jit(size)(1.0)), rel=1e-3)
 
 
 STEP = 1e-3

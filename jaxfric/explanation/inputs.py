@@ -77,8 +77,8 @@ def prepare(
     **Raises:** `ValueError` for what cannot be explained.
     """
     _check(recording, baseline, holdout)
-    recording, seldom = updated(recording)
-    holdout = None if holdout is None else updated(holdout)[0]
+    recording, seldom = interpolated(recording)
+    holdout = None if holdout is None else interpolated(holdout)[0]
     baseline, checked = _simulator(recording, baseline, holdout), None
     if isinstance(baseline, AbstractSimulator):
         doing("looking at signs, zeros, clocks and limits")
@@ -156,7 +156,7 @@ def _alone(recording: Recording) -> Recording:
     return dataclasses.replace(recording, channels=channels)
 
 
-def updated(recording: Recording) -> tuple[Recording, list[Remark]]:
+def interpolated(recording: Recording) -> tuple[Recording, list[Remark]]:
     """A recording with a curve through the updates of a position that is held; and what to say."""
     position = None if recording.position is None else np.asarray(recording.position)
     every = 1 if position is None else held_for(position)
@@ -166,7 +166,7 @@ def updated(recording: Recording) -> tuple[Recording, list[Remark]]:
     fresh = between_updates(time, position, segment, every).astype(position.dtype)
     text = (
         f"{recording.source or 'The recording'}: the position is new at every {every} samples "
-        "only, at a lower rate than the force: taken by cubics between them. Log both alike."
+        "only, at a lower rate than the force: interpolated by cubics. Log both alike."
     )
     remarks = [Remark("position_held", text, False)]
     return dataclasses.replace(recording, position=jnp.asarray(fresh)), remarks

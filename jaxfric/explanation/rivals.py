@@ -38,7 +38,7 @@ def with_rivals(
 ) -> tuple[Finalist, tuple[str, ...], tuple[str, ...]]:
     """The best, the effects that cannot be told from it, and of its own effect the parameters.
 
-    `besides`: finalists that cannot be selected.
+    `besides`: finalists that cannot be selected, though they may fit as well.
 
     Of a line in position and one in time, which are the same at constant speed, the one in position
     is selected: a machine has more pitches than clocks.
@@ -65,14 +65,14 @@ def with_rivals(
     own = best.effect.name
     names = [f.effect.name for f, _ in alike if f.effect.name != own]
     instead = [_parameter(f) for f, _ in alike if f.effect.name == own]
-    twin = [f for f, same in alike if same and _line(f, "position") and _may_be(f, round_)]
+    twin = [f for f, same in alike if same and _line(f, "position") and _selectable(f, round_)]
     if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
         best = twin[0]
         names = [own, *(name for name in names if name != best.effect.name)]
     return best, tuple(dict.fromkeys(names)), tuple(dict.fromkeys(instead))
 
 
-def _may_be(finalist: Finalist, round_: Contest) -> bool:
+def _selectable(finalist: Finalist, round_: Contest) -> bool:
     return any(each is finalist for each in round_.finalists)
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import equinox as eqx
@@ -88,12 +88,12 @@ class Model(eqx.Module):
 
     def without(self, prefix: str) -> "Model":
         """The model without the terms that read a signal whose name begins with `prefix`."""
-        parts = [
-            (term, alpha)
-            for term, alpha in zip(summands(self.term), self.alphas(), strict=True)
-            if not any(name.startswith(prefix) for name in term.coordinates)
-        ]
-        terms, alphas = zip(*parts, strict=True)
+        return self.only(lambda term: not any(c.startswith(prefix) for c in term.coordinates))
+
+    def only(self, kept: Callable[[AbstractTerm], bool]) -> "Model":
+        """The model of some of its terms, at least one."""
+        pairs = zip(summands(self.term), self.alphas(), strict=True)
+        terms, alphas = zip(*((t, a) for t, a in pairs if kept(t)), strict=True)
         return dataclasses.replace(self, term=Sum(terms), alpha=jnp.concatenate(alphas))
 
     def with_bristles(self, stiffness: float, damping: float = 0.0) -> "Model":

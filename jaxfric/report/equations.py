@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from ..export.parts import Line, Part, lines, parts
@@ -38,9 +37,9 @@ def rows(model: Model) -> list[Row]:
     return [_row(part, values) for part in parts(whole)]
 
 
-def of_the_force(terms: Iterable[Row]) -> bool:
-    """Whether a product reads the force f that the motion needs."""
-    return any(re.search(r"\bf\b", product) for row in terms for product in row.products)
+def of_the_force(model: Model) -> bool:
+    """Whether a term reads the force f that the motion needs."""
+    return any(part.faulty for part in parts(model))
 
 
 def _row(part: Part, values: dict[str, str]) -> Row:

@@ -125,7 +125,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "sanity": content.sanity(document),
         "places_note": content.places_note(document),
         "terms": terms,
-        "of_the_force": equations.of_the_force(terms),
+        "of_the_force": model is not None and equations.of_the_force(model),
         "unseen": ", ".join(unseen),
         "parameters": content.parameters(document),
         "units": units,

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Collection, Iterator
 from functools import cached_property, partial
+from typing import TypeGuard
 
 import equinox as eqx
 import jax
@@ -32,8 +33,8 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     to break-away, the value is that of the terms at rest. A
     [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
     first order. What a load pushes that is stepped along the motion (`DryCompliance`,
-    `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings; not inside jit.
-    NaN where a parameter counts that the model has no value for.
+    `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings. NaN where a
+    parameter counts that the model has no value for.
     """
     require_model(model, "predict")
     require(recording, "predict")
@@ -51,10 +52,20 @@ class Prepared:
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
+        self._derived = recording.velocity is None
         self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
-        if recording.velocity is None and not signals.is_traced(recording):
+        if self._derived and not signals.is_traced(recording):
             self._slope = signals.choose(recording)
         self.recording = signals.prepare(recording, self._slope)
+
+    @cached_property
+    def choices(self) -> tuple[signals.Choice | None, ...]:
+        """The local polynomials by which the acceleration is taken, one after the other; `None` for
+        parabolas, inside jit.
+        """
+        if signals.is_traced(self.recording):
+            return (None, None) if self._derived else (None,)
+        return (self._slope, self.choice) if self._derived else (self.choice,)
 
     @cached_property
     def choice(self) -> signals.Choice:
@@ -68,18 +79,6 @@ class Prepared:
         both = self._slope, signals.choose(self.recording, order=2)
         return max(both, key=lambda each: each.half_width)
 
-    def smoothed(self, signal: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
-        """A signal as smooth as the acceleration, outside jit: each derivative by which that was
-        taken, of the signal's integral.
-        """
-        log = self.recording
-        steps = np.where(starts(log), 0.0, np.diff(np.asarray(log.time, float), prepend=0.0))
-        for choice in filter(None, (self._slope, self.choice)):
-            mean = 0.5 * (signal + np.concatenate([signal[:1], signal[:-1]]))
-            whole = np.cumsum(mean * steps)
-            signal = signals.derivative(log, whole, choice.half_width, choice.degree)
-        return signal
-
 
 def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
@@ -88,28 +87,45 @@ def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     force: Callable[[Recording], Array | np.ndarray] = model.force
     if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
         momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
-    rate = _rate(momentum(prepared), prepared, motion)
-    found = force(prepared) + rate
-    if not signals.is_traced(prepared):
-        found = found + _smoothed_pushes(model, prepared, motion)
-    return _later(prepared, found, delay)
+    elif any(map(_stepped, summands(model.term))):
+        force = partial(_with_smooth_pushes, model, motion)
+    rate = _rate(momentum(prepared), prepared, motion.choices[-1])
+    return _later(prepared, force(prepared) + rate, delay)
 
 
-def _smoothed_pushes(model: Model, prepared: Recording, motion: Prepared) -> np.ndarray | float:
-    """What smoothing takes of the pushes of loads that are stepped along the motion, N, `(N,)`.
+def _stepped(term: AbstractTerm) -> TypeGuard[AbstractStates]:
+    """Whether it is a load that is stepped along the motion."""
+    return isinstance(term, AbstractStates) and term.stepped
+
+
+def _with_smooth_pushes(model: Model, motion: Prepared, prepared: Recording):
+    """The force without the rate of the momentum, N, `(N,)`, what loads push being smoothed.
 
     A load that swings swings the motor. Of that the derivative of the motor's momentum holds what
-    it does not smooth, so that of the load's push as much has to be left.
+    it does not smooth, and as much has to be left of the push. The friction that the load takes
+    from the motor jumps as the motor's own does, and is not smoothed.
     """
-    found: np.ndarray | float = 0.0
-    for part, alpha in zip(summands(model.term), model.alphas(), strict=True):
-        if isinstance(part, AbstractStates) and part.stepped:
-            # But for the friction that it takes from the motor: that jumps as the motor's own does.
-            side = np.sign(np.asarray(prepared.velocity, float))[:, None]
-            friction = side * np.asarray(part.relief, float)[None, :]
-            push = (np.asarray(part.columns(prepared), float) + friction) @ np.asarray(alpha, float)
-            found = found + (motion.smoothed(push) - push).astype(prepared.time.dtype)
-    return found
+    total = jnp.zeros_like(prepared.time)
+    if not all(map(_stepped, summands(model.term))):
+        total = model.only(lambda term: not _stepped(term)).force(prepared)
+    side = jnp.sign(prepared.velocity)
+    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+        if _stepped(term):
+            friction = side * (jnp.stack([*map(jnp.asarray, term.relief)]) @ alpha)
+            push = weighed(term.columns(prepared), alpha) + friction
+            total = total + _smoothed(push, prepared, motion) - friction
+    return total
+
+
+def _smoothed(signal: Float[Array, " N"], prepared: Recording, motion: Prepared):
+    """A signal as smooth as the acceleration, `(N,)`: each derivative by which that is taken, of
+    the signal's integral.
+    """
+    between = jnp.where(starts(prepared), 0.0, jnp.diff(prepared.time, prepend=prepared.time[:1]))
+    for choice in motion.choices:
+        mean = 0.5 * (signal + jnp.concatenate([signal[:1], signal[:-1]]))
+        signal = _rate(jnp.cumsum(mean * between), prepared, choice)
+    return signal
 
 
 def _by_samples(model: Model) -> bool:
@@ -137,17 +153,16 @@ def _in_blocks(of: Callable[[Recording], Array], recording: Recording) -> np.nda
     return values
 
 
-def _rate(momentum: Float[Array, " N"], prepared: Recording, known: Prepared):
+def _rate(momentum: Float[Array, " N"], prepared: Recording, choice: signals.Choice | None):
     """The zero-phase smoothing derivative of the momentum, `(N,)`; inside jit by parabolas."""
     traced = signals.is_traced(prepared) or isinstance(momentum, jax.core.Tracer)
-    if traced:
+    if traced or choice is None:
         motion = prepared
         if prepared.position is None:
             motion = dataclasses.replace(prepared, position=prepared.velocity)
         width = jax.lax.stop_gradient(signals.choose_half_width(motion, signals.TRACED_REACH))
         span = (width + 0.5) * signals.interval(prepared)
         return signals.local_quadratic(prepared, momentum, span, signals.TRACED_REACH)[1]
-    choice = known.choice
     rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree)
     return rate.astype(momentum.dtype, copy=False)
 

@@ -46,6 +46,7 @@ class Waves(NamedTuple):
     harmonics: int = 1
 
 
+# The direction of motion, ±1, as the factor of a wave.
 SIDE = "side"
 
 

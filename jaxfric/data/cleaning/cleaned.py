@@ -88,12 +88,12 @@ def _with_all_stamps(signals, segment, rows, stamped, notes, source):
 
 
 def _fresh(signals, segment, notes) -> None:
-    """A position that comes at a lower rate than the rest, by cubics between its updates."""
+    """A position that comes at a lower rate than the rest, interpolated by cubics."""
     every = held_for(signals["position"]) if "position" in signals else 1
     if every > 1:
         fresh = between_updates(signals["time"], signals["position"], segment, every)
         signals["position"] = fresh
-        notes.append(f"The position is new at every {every} samples only: cubics between them.")
+        notes.append(f"The position is new at every {every} samples only: interpolated by cubics.")
 
 
 def _mask(signals, segment, rows, notes, source) -> np.ndarray:

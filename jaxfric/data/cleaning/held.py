@@ -25,8 +25,10 @@ def between_updates(
 ) -> np.ndarray:
     """The position by cubics through its updates, each of which is right when it comes.
 
-    With the slopes of parabolas through three (Catmull & Rom 1974). Straight lines err by (ωT)²/8
-    of a wave, with 15 updates T a cycle by a fiftieth, and their bends look like forces.
+    Their slopes are those of parabolas through three updates (Catmull & Rom, "A class of local
+    interpolating splines", 1974). Straight lines err by (ωT)²/8 of a wave, with 15 updates T a
+    cycle by a fiftieth, and their bends look like forces. `time`, s, and `position`, m, `(N,)`;
+    `every`, the samples from one update to the next.
     """
     first = int(np.flatnonzero(np.diff(position) != 0)[0] + 1) % every
     found = np.array(position, float)
@@ -40,7 +42,9 @@ def between_updates(
 
 
 def _through(time: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Cubics through values at times, `(n,)`, at others, `(m,)`; constant beyond the ends."""
+    """Cubics through `values` at `time`, `(n,)`, at other times `wanted`, `(m,)`; constant beyond
+    the ends.
+    """
     slope = np.gradient(values, time, edge_order=2 if len(time) > 2 else 1)
     left = np.clip(np.searchsorted(time, wanted, "right") - 1, 0, len(time) - 2)
     span = time[left + 1] - time[left]

@@ -8,12 +8,13 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from ..base import AbstractTerm, leaves
+from ..change import AbstractChange
 from ..effect import Effect, Extent
 from ..friction import Coulomb, Viscous
 from ..inertia import Inertia, Offset
 from ..known import KnownColumns, KnownGain
 from ..sample import UNKNOWN, Scales
-from .steps import AbstractChange, moments, ramp
+from .steps import moments, ramp
 
 
 class ParameterStep(AbstractChange):

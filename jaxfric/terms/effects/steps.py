@@ -1,23 +1,20 @@
 """What changes at one moment: friction, the load, a gain."""
 
 import dataclasses
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...data.recording import Recording
 from ...units import (
     DIMENSIONLESS,
     TIME,
 )
 from ..actuator import PREDICTED
-from ..base import AbstractLaw, AbstractTerm, Sum, summands, vector
+from ..base import AbstractLaw, AbstractTerm, Sum, summands
+from ..change import STEP_TIME, AbstractChange, around, course, inside_record, stepped, stepped_text
 from ..effect import GRID, Effect, Extent, View, even
 from ..friction import Coulomb
 from ..inertia import Inertia, Offset
@@ -25,20 +22,7 @@ from ..known import KnownColumns
 from ..position import Gravity
 from ..sample import UNKNOWN, Parameter, Resolution, Sample, Scales
 from ..table import reading
-from ..text import Syntax, literal
 from ..time import AbstractModulated
-
-
-def _within(scales):
-    """Inside the record but its first and last 2 %, where one level rests on too few samples."""
-    margin = 0.02 * scales.duration
-    return scales.start + margin, scales.start + scales.duration - margin
-
-
-# Two dates of a step differ by what lies between them only: the cost is no parabola but a wedge,
-# and a date is refined within a step of the grid.
-_MOMENTS = Resolution(1, 256, None, 256)
-STEP_TIME = Parameter("step_time", TIME, _within, logarithmic=False, resolution=_MOMENTS)
 
 
 class FrictionStep(AbstractModulated):
@@ -55,20 +39,20 @@ class FrictionStep(AbstractModulated):
     prefix: ClassVar = "step"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
-        return _stepped(self, time)
+        return stepped(time, self.step_time, self.ramp)
 
     def factor_text(self, s, name):
-        return _stepped_text(self, s, name)
+        return stepped_text(s, name, self.ramp)
 
     @property
     def switched(self):
         return None if self.term.nonlinear else self.term
 
     def course(self, betas, time):
-        return _course(self.ramp, betas, time)
+        return course(self.ramp, betas, time)
 
     def extent(self, values):
-        return super().extent(values) | _about(values["step_time"], self.ramp)
+        return super().extent(values) | around(values["step_time"], self.ramp)
 
 
 # A step in friction cannot be dated better than to about one kernel of the weak form, some
@@ -85,7 +69,8 @@ class FrictionRamp(AbstractModulated):
     """Friction that changes from one level to another in some time: F = ΔF g(v) φ(t), g the law
     `term`; φ rises in a straight line from 0 to 1 over T about t_c.
 
-    `step_time` t_c and `step_duration` T, s. [`FrictionStep`][] is the same at once.
+    ΔF, N for Coulomb friction, is affine; `step_time` t_c and `step_duration` T, s, are not.
+    [`FrictionStep`][] is the same at once.
     """
 
     term: AbstractTerm = Coulomb()
@@ -98,123 +83,20 @@ class FrictionRamp(AbstractModulated):
     prefix: ClassVar = "step"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
-        return jnp.clip((time - self.step_time) / self.step_duration + 0.5, 0.0, 1.0)
+        return stepped(time, self.step_time, self.step_duration)
 
     def factor_text(self, s, moment, duration):
-        return s.clip(f"(t - {moment}) / {duration} + 0.5", "0.0", "1.0")
+        return stepped_text(s, moment, duration)
 
     @property
     def switched(self):
         return None if self.term.nonlinear else self.term
 
     def course(self, betas, time):
-        return _course(betas[:, 1:2], betas, time)
+        return course(betas[:, 1:2], betas, time)
 
     def extent(self, values):
-        return super().extent(values) | _about(values["step_time"], values["step_duration"])
-
-
-def _about(moment: float, ramp: float) -> dict[str, tuple[float, float]]:
-    half = ramp or 1.0
-    return {"time": (moment - half, moment + half)}
-
-
-def _course(
-    ramp: float | np.ndarray, betas: np.ndarray, time: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The step and its rate at each time, for the moments in the first column of `betas`."""
-    late = time[None, :] - betas[:, :1]
-    if np.all(ramp == 0):
-        return np.where(late > 0, 1.0, 0.0), np.zeros_like(late)
-    inside = np.abs(late) < 0.5 * ramp
-    return np.clip(late / ramp + 0.5, 0.0, 1.0), np.where(inside, 1 / ramp, 0.0)
-
-
-def _stepped(step, time):
-    """A ramp of `step.ramp` seconds from zero to one about `step.step_time`, s."""
-    late = time - step.step_time
-    if not isinstance(step.ramp, jax.Array) and step.ramp == 0:
-        return jnp.where(late > 0, jnp.ones_like(late), 0.0)
-    return jnp.clip(late / step.ramp + 0.5, 0.0, 1.0)
-
-
-def _stepped_text(step, s: Syntax, name: str) -> str:
-    """The same in a language."""
-    if step.ramp == 0:
-        return s.choose(f"t > {name}", "1.0", "0.0")
-    return s.clip(f"(t - {name}) / {literal(step.ramp)} + 0.5", "0.0", "1.0")
-
-
-class AbstractChange(AbstractTerm):
-    """Terms that begin at one moment: F = φ f, φ(t) = 1(t > t_c), f the force of `changed`.
-
-    Momentum comes and goes with the axis' own speed, so that there is no impulse: φ dp/dt is
-    d/dt(φ p) − φ̇ p. `step_time` t_c, s; the step is a ramp as in [`FrictionStep`][]. A concrete
-    class gives the `prefix` of its affine parameters.
-    """
-
-    step_time: eqx.AbstractVar[Float[Array, ""] | float]
-    ramp: eqx.AbstractVar[float]
-    prefix: eqx.AbstractClassVar[str]
-
-    @property
-    @abstractmethod
-    def changed(self) -> AbstractTerm:
-        """The terms that begin."""
-
-    @property
-    def affine(self):
-        return tuple(p._replace(name=f"{self.prefix}_{p.name}") for p in self.changed.affine)
-
-    @property
-    def nonlinear(self):
-        return (STEP_TIME,)
-
-    @property
-    def coordinates(self):
-        return self.changed.coordinates | {"time"}
-
-    @property
-    def inertial(self) -> bool:
-        return self.changed.inertial
-
-    def text(self, s, *names):
-        own = [term.text(s) for term in summands(self.changed)]
-        if any(columns is None for columns in own):
-            return None
-        share = _stepped_text(self, s, names[0])
-        return [f"{share} * ({column})" for columns in own for column in columns or ()]
-
-    def columns(self, recording: Recording) -> Float[Array, "N p"]:
-        share, time = _stepped(self, recording.time), recording.time
-        plain = share[:, None] * self.changed.columns(recording)
-        if not isinstance(self.ramp, jax.Array) and self.ramp == 0:
-            return plain
-        inside = jnp.abs(time - self.step_time) < 0.5 * self.ramp
-        rate = jnp.where(inside, 1 / self.ramp, 0.0)
-        return plain - rate[:, None] * self.changed.momentum(recording)
-
-    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return _stepped(self, recording.time)[:, None] * self.changed.momentum(recording)
-
-    def offset(self, recording: Recording) -> Float[Array, " N"]:
-        return jnp.zeros_like(recording.time)
-
-    def beta(self) -> Float[Array, " d"]:
-        return vector([self.step_time])
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractChange":
-        return eqx.tree_at(lambda term: term.step_time, self, beta[0])
-
-    @property
-    def switched(self) -> AbstractTerm:
-        return self.changed
-
-    def course(self, betas, time):
-        return _course(self.ramp, betas, time)
-
-    def extent(self, values):
-        return self.changed.extent(values) | _about(values["step_time"], self.ramp)
+        return super().extent(values) | around(values["step_time"], values["step_duration"])
 
 
 class PayloadChange(AbstractChange):
@@ -247,10 +129,10 @@ class GainStep(AbstractLaw):
     coordinates: ClassVar = frozenset({"time", PREDICTED})
 
     def law(self, sample: Sample):
-        return (_stepped(self, sample.time) * reading(sample, PREDICTED),)
+        return (stepped(sample.time, self.step_time, self.ramp) * reading(sample, PREDICTED),)
 
     def text(self, s, *names):
-        return (f"{_stepped_text(self, s, names[0])} * f",)
+        return (f"{stepped_text(s, names[0], self.ramp)} * f",)
 
 
 # Machines whose mass or gain changes while they run are not drawn: of a seed of `prove` every case
@@ -274,7 +156,7 @@ def _changes(term: FrictionStep | FrictionRamp, view: View) -> np.ndarray:
     if isinstance(term, FrictionStep):
         return moments(term, view)
     shares = 2.0 ** -np.arange(2.5, 6.0)
-    low, high = (float(end) for end in _within(view.limits))
+    low, high = (float(end) for end in inside_record(view.limits))
     pairs = [
         (moment, share * float(view.limits.duration))
         for share in shares

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..base import Directional
-from ..effect import GRID, Effect, View, even, inside
+from ..effect import Effect, View, even
 from ..friction import Exponential, Gaussian, Generalised, Lorentzian
 
 # Exponents of a bump beside those that have a law of their own, 1 and 2: from 1/2 on (Bo &
@@ -15,9 +15,8 @@ def bumps(term: Directional, view: View) -> np.ndarray:
     """Speeds, the same for both directions, with a few exponents where they are free."""
     if not isinstance(term.positive, Generalised):
         return even(term, view)
-    along = (np.arange(GRID) + 0.5) / GRID
-    speeds = inside(Directional(Exponential()), view.limits, np.repeat(along[:, None], 2, axis=1))
-    return np.array([(v, n, v, n) for n in _EXPONENTS for v in speeds[:, 0]])
+    speeds = even(Exponential(), view)[:, 0]
+    return np.array([(v, n, v, n) for n in _EXPONENTS for v in speeds])
 
 
 STRIBECK = Effect(
