@@ -281,12 +281,15 @@ def test_an_unseen_parameter_is_no_number():
     assert coulomb.products == ("20 · sign v, v > 0", "+ ? · sign v, v < 0")
 
 
-def test_a_page_says_what_f_is_where_a_formula_reads_it():
-    known = jf.models.from_parameters(jf.terms.Coulomb() + jf.terms.Viscous(), {
-        "coulomb": 2.0, "viscous": 3.0,
-    })  # fmt: skip
-    fault = jf.models.Model(known.term + jf.terms.GainAsymmetry(), np.array([2.0, 3.0, 0.1]))
-    assert equations.of_the_force(fault) and not equations.of_the_force(known)
+def test_a_page_says_what_f_is_where_a_formula_reads_it_and_shows_what_was_not_seen(full):
+    ripple = jf.models.from_parameters(
+        model().term + jf.terms.ForceRipple(), model().parameters | {
+            "coulomb-": float("nan"), "ripple_sin": 0.1, "ripple_cos": 0.0, "pitch_2": 0.02,
+        },
+    )  # fmt: skip
+    seen = page.render(DOCUMENT | {"model": ripple.to_dict()}, curves(), "jaxfric explain", "today")
+    assert "f the sum without the terms that hold it" in seen and "stands for what" in seen
+    assert "f the sum without" not in full and "stands for what" not in full
 
 
 def test_a_term_with_a_memory_is_given_by_its_law():

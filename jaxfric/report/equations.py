@@ -37,11 +37,6 @@ def rows(model: Model) -> list[Row]:
     return [_row(part, values) for part in parts(whole)]
 
 
-def of_the_force(model: Model) -> bool:
-    """Whether a term reads the force f that the motion needs."""
-    return any(part.faulty for part in parts(model))
-
-
 def _row(part: Part, values: dict[str, str]) -> Row:
     name = part.name.replace("_", " ")
     try:

@@ -9,6 +9,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ..models import Model
+from ..terms.actuator import PREDICTED
 from . import advice, charts, content, equations, handover
 from .advice import spoken
 
@@ -125,7 +126,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "sanity": content.sanity(document),
         "places_note": content.places_note(document),
         "terms": terms,
-        "of_the_force": model is not None and equations.of_the_force(model),
+        "of_the_force": model is not None and PREDICTED in model.term.coordinates,
         "unseen": ", ".join(unseen),
         "parameters": content.parameters(document),
         "units": units,
