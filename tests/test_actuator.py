@@ -21,6 +21,7 @@ FAULTS = {
     "dead-band": (terms.ActuatorDeadband(), {"deadband": 2.0}),
     "saturation": (terms.ActuatorSaturation(), {"saturation": 0.3, "knee": 8.0}),
     "load friction": (terms.LoadDependentFriction(), {"load_friction": 0.1}),
+    "reaction friction": (terms.ReactionFriction(), {"reaction_friction": 0.2}),
     "gain step": (terms.GainStep(), {"step_gain": 0.1, "step_time": 0.7}),
     "delay": (terms.TransportDelay(), {"delay": 0.0043}),
     "lag": (terms.ActuatorLag(), {"lag": 0.004}),
@@ -54,6 +55,7 @@ def distance(model, run):
 @pytest.mark.parametrize(
     "names",
     [
+        ("reaction friction",),
         ("gain asymmetry", "dead-band", "saturation", "load friction", "gain step"),
         pytest.param(("delay", "dead-band"), marks=pytest.mark.slow),
         *[pytest.param((name,), marks=pytest.mark.slow) for name in FAULTS],
@@ -94,6 +96,35 @@ def test_friction_by_load_takes_its_part_off_at_rest():
     """U = f + 0.1 f on the way forward: 5 N are overcome by 5.5."""
     assert not np.any(np.asarray(open_loop(axis("load friction"), np.full(50, 5.49)).velocity))
     assert np.all(np.asarray(open_loop(axis("load friction"), np.full(50, 5.51)).velocity)[1:] > 0)
+
+
+def test_friction_by_the_reaction_makes_the_axis_heavier_ahead_and_lighter_in_braking():
+    """11 N less 5 N of Coulomb friction accelerate (1 + 0.2) 2 kg; -4 N and friction brake 0.8."""
+    model = from_parameters(
+        terms.Coulomb() + terms.Inertia() + terms.ReactionFriction(),
+        {"coulomb": 5.0, "inertia": 2.0, "reaction_friction": 0.2},
+    )
+    run = open_loop(model, np.where(np.arange(300) < 200, 11.0, -4.0))
+    v = np.asarray(run.velocity)
+    assert (v[150] - v[50]) / 0.1 == pytest.approx(6 / 2.4, rel=1e-9)
+    assert (v[270] - v[210]) / 0.06 == pytest.approx(-9 / 1.6, rel=1e-9)
+
+
+def test_a_weight_is_held_by_the_friction_that_it_makes():
+    """10 N of weight on a screw of 0.3: from 7 to 13 N nothing moves; outside, 1 N of rest does."""
+    model = from_parameters(
+        terms.Coulomb() + terms.Inertia() + terms.Offset() + terms.ReactionFriction(),
+        {"coulomb": 0.0, "inertia": 2.0, "offset": 10.0, "reaction_friction": 0.3},
+    )
+    for force, way in ((7.05, 0.0), (12.95, 0.0), (6.9, -1.0), (13.1, 1.0)):
+        assert np.all(np.sign(open_loop(model, np.full(50, force)).velocity)[1:] == way)
+
+
+@pytest.mark.parametrize("share", [1.0, 1.2])
+def test_friction_that_is_all_of_its_load_is_refused(share):
+    model = axis("reaction friction").with_parameters({"reaction_friction": share})
+    with pytest.raises(ValueError, match="locks itself"):
+        jf.simulate(model, swing(), jf.PD(3000.0, 120.0))
 
 
 FREE = {"inertia": 2.0}

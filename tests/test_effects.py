@@ -41,6 +41,7 @@ CASES = {
     "sticky_spot": (T.StickySpot(0.01, 0.003), (2.0,)),
     "position_inertia": (T.PositionDependentInertia(0.06), (0.4, 0.5)),
     "load_friction": (T.LoadDependentFriction(), (0.1,)),
+    "reaction_friction": (T.ReactionFriction(), (0.1,)),
     "recorded_load": (T.LoadDependentFriction("load"), (0.1,)),
     "cross_axis": (T.CrossAxis(), (0.5, 8.0)),
     "deadband": (T.ActuatorDeadband(), (1.5,)),
@@ -92,6 +93,7 @@ def motion(force=1.0, position=1.0, count=12):
     v[4] = 0.0
     channels = {
         "predicted_force": force * 30 * np.sin(2 * t + 1),
+        "predicted_reaction": force * 20 * np.sin(3 * t + 1),
         "neighbour_velocity": position * 0.1 * np.sin(2 * t),
         "load": force * (5 + np.sin(t)),
     }
@@ -272,6 +274,7 @@ def test_values_by_hand():
     assert column(T.ActuatorSaturation(2.0), at(predicted_force=-5.0)) == -3.0
     assert column(T.GainAsymmetry(), at(predicted_force=-5.0)) == 0.0
     assert column(T.LoadDependentFriction("load"), at(v=-1.0, load=-7.0)) == -7.0
+    assert column(T.ReactionFriction(), at(v=-1.0, predicted_reaction=-7.0)) == -7.0
     assert column(T.ThermalDrift(T.Viscous(), 2.0, start=1.0), at(t=3.0, v=2.0)) == pytest.approx(
         2 * np.exp(-1)
     )
@@ -511,6 +514,7 @@ def with_predictions(run, model):
     other = 0.1 * np.sin(2 * np.pi * 0.47 * np.asarray(run.time))
     channels = {
         "predicted_force": inertia * acceleration + friction,
+        "predicted_reaction": inertia * acceleration,
         "neighbour_velocity": other,
         "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
     }

@@ -18,6 +18,7 @@ from jaxfric.cli import main, saving
 from jaxfric.data.recording import Recording
 from jaxfric.export import TARGETS, export
 from jaxfric.terms import Directional
+from jaxfric.terms.actuator import carried
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 needs_cc = pytest.mark.skipif(COMPILER is None, reason="there is no C compiler here")
@@ -74,6 +75,7 @@ LAWS = {
     "dead-band": terms.ActuatorDeadband(),
     "saturation": terms.ActuatorSaturation(4.0),
     "load friction": terms.LoadDependentFriction(),
+    "reaction friction": terms.ReactionFriction(),
     "gain step": terms.GainStep(-0.1, ramp=0.3),
     "gain by direction": Directional(terms.GainAsymmetry()),
 }
@@ -111,8 +113,10 @@ def force_of(model, x, v, a, t):
         rate = jax.jvp(momentum, (x, v, t), (v, a, jnp.ones_like(t)))[1]
         return some.force(motion_of(x, v, t)) + rate
 
-    if "predicted_force" in model.term.coordinates:
-        channels = {"predicted_force": whole(model.without("predicted_"))}
+    sound = {"predicted_force": lambda term: True, "predicted_reaction": carried}
+    if model.term.coordinates & set(sound):
+        rest = model.without("predicted_")
+        channels = {name: whole(rest.only(kept)) for name, kept in sound.items()}
     return whole(model)
 
 
@@ -221,7 +225,7 @@ def translated(expression, names):
 def parsed(text):
     """Parameters and equations of a block."""
     parameters = re.findall(r"parameter Real (\w+)(?:\(unit=\"[^\"]*\"\))? = (\S+) \"", text)
-    equations = re.findall(r"^  (friction|f|force) = (.*?);$", text, re.MULTILINE | re.DOTALL)
+    equations = re.findall(r"^  (friction|f|r|force) = (.*?);$", text, re.MULTILINE | re.DOTALL)
     return {name: float(value) for name, value in parameters}, dict(equations)
 
 
@@ -233,7 +237,7 @@ def test_modelica_computes_the_library_s_force():
     functions |= {name: getattr(np, name) for name in ("sign", "abs", "exp", "sin", "cos")}
     names = parameters | functions | {"x": x, "v": v, "a": a, "t": t}
     names = {k: np.asarray(z) if isinstance(z, jax.Array) else z for k, z in names.items()}
-    for name in ("friction", "f", "force"):
+    for name in ("friction", "f", "r", "force"):
         names[name] = translated(" ".join(equations[name].split()), names)
     friction, force = names["friction"], names["force"]
     np.testing.assert_allclose(friction, known.friction(v), rtol=1e-11, atol=1e-11)

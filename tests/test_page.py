@@ -289,6 +289,11 @@ def test_a_page_says_what_f_is_where_a_formula_reads_it_and_shows_what_was_not_s
     )  # fmt: skip
     seen = page.render(DOCUMENT | {"model": ripple.to_dict()}, curves(), "jaxfric explain", "today")
     assert "f the sum without the terms that hold it" in seen and "stands for what" in seen
+    screw = jf.models.from_parameters(
+        model().term + jf.terms.ReactionFriction(), model().parameters | {"reaction_friction": 0.1}
+    )
+    seen = page.render(DOCUMENT | {"model": screw.to_dict()}, curves(), "jaxfric explain", "today")
+    assert "r what of the sum is no friction" in seen
     assert "f the sum without" not in full and "stands for what" not in full
 
 

@@ -33,6 +33,7 @@ from ..looks.text import text
 from ..models import Model
 from ..signals import kernel_half_width, prepare
 from ..simulation.prediction import arrived, delay_of, force_error, in_motion, relative, residual
+from ..terms.actuator import PREDICTED, REACTION
 from ..units import SI
 from .messages import message, say
 from .saving import saved
@@ -249,7 +250,7 @@ def predict(arguments: Namespace) -> int:
     recording, notes = read(arguments.file, arguments)
     recording = _in_units(recording, model, arguments)
     needed = model.term.coordinates - {"acceleration", "time", "position", "velocity"}
-    needed -= {"predicted_force"}  # predict works it out
+    needed -= {PREDICTED, REACTION}  # predict works it out
     if missing := sorted(needed - set(recording.channels)):
         raise ValueError(
             f"{arguments.file}: the model needs {', '.join(missing)}. Name the columns: "

@@ -8,6 +8,8 @@ import jax
 import numpy as np
 
 from ..data.recording import Recording
+from ..terms import KNOWN_FORCE
+from ..terms.actuator import REACTION
 from ..terms.base import AbstractTerm, leaves
 from ..terms.effect import Effect, View, inside
 from ..terms.effects import EFFECTS
@@ -23,7 +25,7 @@ KEPT = 1 << 28
 
 
 # Signals that a recording may lack, of which some laws of an effect are functions.
-CHANNELS = frozenset({"position", "load"})
+CHANNELS = frozenset({"position", "load", REACTION})
 
 
 class Candidate(NamedTuple):
@@ -142,6 +144,8 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     """Every term of every effect that this recording has the signals for."""
     seen = view(evidence)
     have = {"predicted_force", *evidence.motion.channels}
+    if KNOWN_FORCE not in have:  # another simulator's force is not told apart
+        have.add(REACTION)
     if evidence.motion.position is not None:
         have.add("position")
     turn = TURNS.get(dict(evidence.motion.units).get("position", ""))

@@ -4,6 +4,8 @@ import numpy as np
 
 from ..signals import kernel_slope
 from ..terms import KNOWN_FORCE
+from ..terms.actuator import carried
+from ..terms.base import summands
 from ..terms.effects import traits
 from .evaluation import evaluate, sizes
 from .evidence import Evidence
@@ -11,32 +13,37 @@ from .nodes import NODES
 from .regression import Fit
 
 # The signals that a fit predicts at the nodes.
-PREDICTED = frozenset({"predicted_force", "predicted_acceleration"})
+PREDICTED = frozenset({"predicted_force", "predicted_reaction", "predicted_acceleration"})
 
 
 def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     """The evidence with the channels that some terms read, at the nodes.
 
     `predicted_force` û, N (the measured force in its place would explain itself);
-    `predicted_acceleration`, m/s².
+    `predicted_reaction`, what of that is no friction, N; `predicted_acceleration`, m/s².
     """
-    force, momentum = np.zeros((2, evidence.motion.num_samples))
+    force, momentum, reaction, moved = np.zeros((4, evidence.motion.num_samples))
     for term, beta, alpha in zip(fit.terms, fit.betas, fit.alphas, strict=True):
         if term.coordinates & PREDICTED:
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
             term, np.repeat(beta[None], sizes(term)[0], axis=0), evidence.motion
         )
+        borne = alpha * [carried(part) for part in summands(term) for _ in part.affine]
         force = force + alpha @ np.asarray(plain)[0]
+        reaction = reaction + borne @ np.asarray(plain)[0]
         if moving is not None:
             momentum = momentum + alpha @ np.asarray(moving)[0]
+            moved = moved + borne @ np.asarray(moving)[0]
     force = force + rate(evidence, momentum)
+    reaction = reaction + rate(evidence, moved)
     if KNOWN_FORCE in evidence.motion.channels:
         force = force + np.asarray(evidence.motion.channels[KNOWN_FORCE])
     if any(traits(term).switches for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(
         predicted_force=force,
+        predicted_reaction=reaction,
         predicted_acceleration=rate(evidence, np.asarray(evidence.motion.velocity)),
     )
 

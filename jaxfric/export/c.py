@@ -129,7 +129,18 @@ def whole(taken: Divided) -> str:
     if not taken.faulty:
         return body(taken.rest)
     needed = "    /* What a faultless actuator would have to give. */\n    const double f = u;\n\n"
-    return f"{body(taken.rest)}{needed}{body(taken.faulty)}"
+    return f"{body(taken.rest)}{needed}{_reaction(taken.borne)}{body(taken.faulty)}    (void)f;\n"
+
+
+def _reaction(borne: Sequence[Part] | None) -> str:
+    """The statements that say what friction carries, `r`, where some is a share of it."""
+    if borne is None:
+        return ""
+    inner = "".join(f"    {row}\n" if row else "\n" for row in body(borne).splitlines())
+    return (
+        "    /* What friction carries. */\n    double r;\n    {\n        double u = 0.0;\n"
+        f"{inner}        r = u;\n    }}\n\n"
+    )
 
 
 def body(some: Sequence[Part]) -> str:

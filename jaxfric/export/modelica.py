@@ -16,7 +16,7 @@ _KEYWORDS = set(
     "model not operator or outer output package parameter partial protected public pure record "
     "redeclare replaceable return stream then time true type when while within Real".split()
 )
-_OWN = {"position", "velocity", "acceleration", "friction", "force", *"xvatf"}
+_OWN = {"position", "velocity", "acceleration", "friction", "force", *"xvatfr"}
 
 
 def export(model: Model, name: str = "axis") -> Exported:
@@ -40,7 +40,7 @@ def export(model: Model, name: str = "axis") -> Exported:
         + "".join(f"  // Left out: {' '.join(text.split())}.\n" for text in missing)
         + "".join(_parameter(*row) for row in constants(model) if row[0] in written)
         + "".join(_parameter(*row) for row in levels(model))
-        + _signals(model, ", f" * bool(taken.faulty))
+        + _signals(model, ", f" * bool(taken.faulty) + ", r" * (taken.borne is not None))
         + "".join(f'  Real {_state(part)} "deflection of the bristle";\n' for part in states)
         + "".join(["initial equation\n"] * bool(states))
         + "".join(f"  {_state(part)} = sign(v);\n" for part in states)
@@ -48,6 +48,7 @@ def export(model: Model, name: str = "axis") -> Exported:
         + "".join(map(_evolution, states))
         + f"  friction = noEvent({_sum(_products(taken.slip))});\n"
         + f"  f = noEvent({needed});\n" * bool(taken.faulty)
+        + f"  r = noEvent({_sum(_products(taken.borne or ()))});\n" * (taken.borne is not None)
         + f"  force = noEvent({actual});\n"
         + f"end {name};\n"
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import terms as laws
 from ..models import Model
-from ..terms.actuator import PREDICTED
+from ..terms.actuator import PREDICTED, REACTION, carried, predicted
 from ..terms.base import AbstractTerm, summands
 from ..terms.effects import effect_of, traits
 from ..terms.known import KNOWN
@@ -56,8 +56,8 @@ class Part(NamedTuple):
 
     @property
     def faulty(self) -> bool:
-        """Whether it is what an actuator makes of the force that all the others need."""
-        return PREDICTED in self.term.coordinates
+        """Whether it is a function of the force that the others need, as a fault of an actuator."""
+        return predicted(self.term)
 
     @property
     def remembered(self) -> bool:
@@ -95,6 +95,13 @@ class Divided(NamedTuple):
         held = (*self.slip, *self.rest, *self.states, *self.faulty)
         return frozenset(name for part in held for name in (*part.affine, *part.nonlinear))
 
+    @property
+    def borne(self) -> tuple[Part, ...] | None:
+        """The parts whose force friction carries; `None` where no friction is a share of it."""
+        if not any(REACTION in part.term.coordinates for part in self.faulty):
+            return None
+        return tuple(part for part in (*self.slip, *self.rest) if carried(part.term))
+
 
 def divided(model: Model, states: bool = False) -> Divided:
     """The parts of a model as a language takes them; `states`, whether it knows bristles.
@@ -122,7 +129,7 @@ def _spelled(part: Part) -> bool:
         lines(C, part)
     except ValueError:
         return False
-    return part.term.coordinates <= SAMPLED | {PREDICTED}
+    return part.term.coordinates <= SAMPLED | {PREDICTED, REACTION}
 
 
 def parts(model: Model) -> tuple[Part, ...]:
@@ -259,7 +266,7 @@ def left_out(model: Model, part: Part) -> str:
         most = burst(model, part)
         size = f"; up to {most:.3g} {units['force']} around a reversal" if most else ""
         return f"{part.name}: it has a memory, and a function of the present motion has none{size}"
-    channels = sorted(part.term.coordinates - SAMPLED - {PREDICTED})
+    channels = sorted(part.term.coordinates - SAMPLED - {PREDICTED, REACTION})
     if channels:
         return f"{part.name}: it needs {', '.join(channels)}, which the motion does not say"
     if part.faulty:

@@ -24,7 +24,7 @@ _KEYWORDS = set(
 )
 _PLAIN = str.maketrans({"·": ".", "²": "2", "³": "3", "⁴": "4", "µ": "u", "°": "deg"})
 _NEEDED = "(* what a faultless actuator would have to give *)\nf := force;"
-_OWN = {"position", "velocity", "acceleration", "elapsed", "friction", "force", *"xvatf"}
+_OWN = {"position", "velocity", "acceleration", "elapsed", "friction", "force", *"xvatfr"}
 
 
 def export(model: Model, name: str = "axis") -> Exported:
@@ -46,7 +46,7 @@ def export(model: Model, name: str = "axis") -> Exported:
             _head(name, units, missing),
             _sign(name),
             f"FUNCTION_BLOCK {name}",
-            _signals(units, ", f" * bool(taken.faulty)),
+            _signals(units, ", f" * bool(taken.faulty) + ", r" * (taken.borne is not None)),
             _constants(model, taken),
             "x := position;\nv := velocity;\na := acceleration;\nt := elapsed;",
             "friction := 0.0;",
@@ -54,6 +54,7 @@ def export(model: Model, name: str = "axis") -> Exported:
             "force := friction;",
             _body(syntax, taken.rest, "force"),
             *[_NEEDED] * bool(taken.faulty),
+            *_reaction(syntax, taken.borne),
             _body(syntax, taken.faulty, "force"),
             "END_FUNCTION_BLOCK\n",
         )
@@ -66,6 +67,13 @@ def export(model: Model, name: str = "axis") -> Exported:
     held = [f"{name} {value:.4g} {unit}" for name, value, unit in levels(model)]
     remarks = (remark, *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held))
     return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing, remarks)
+
+
+def _reaction(syntax: Syntax, borne: Sequence[Part] | None) -> list[str]:
+    """What friction carries, `r`, where some is a share of it."""
+    if borne is None:
+        return []
+    return ["(* what friction carries *)\nr := 0.0;", _body(syntax, borne, "r")]
 
 
 def _fine(name: str) -> bool:

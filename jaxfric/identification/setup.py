@@ -10,7 +10,7 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording, described
 from ..models import Model, named
-from ..terms.actuator import PREDICTED
+from ..terms.actuator import PREDICTED, REACTION
 from ..terms.base import AbstractTerm
 from . import blocks, grids
 from .identified import Identified
@@ -133,11 +133,11 @@ def _check(term, projection, recording):
         )
     missing = {"position"} & beyond if recording.position is None else set()
     missing |= {c for c in beyond if c not in ("position", "time") and c not in recording.channels}
-    if PREDICTED in missing:
+    if missing & {PREDICTED, REACTION}:
         raise ValueError(
             "The model holds a term of the force that the motion needs, as faults of an actuator "
-            "are, and the recording does not hold that. Identify the rest; jaxfric.explain finds "
-            "such faults beside it."
+            "are and friction by its load, and the recording does not hold that. Identify the "
+            "rest; jaxfric.explain finds such terms beside it."
         )
     if missing:
         place = [] if recording.position is None else ["position"]

@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import Any
 
 from ..models import Model
-from ..terms.actuator import PREDICTED
+from ..terms.actuator import PREDICTED, REACTION
 from . import advice, charts, content, equations, handover
 from .advice import spoken
 
@@ -127,6 +127,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "places_note": content.places_note(document),
         "terms": terms,
         "of_the_force": model is not None and PREDICTED in model.term.coordinates,
+        "of_the_reaction": model is not None and REACTION in model.term.coordinates,
         "unseen": ", ".join(unseen),
         "parameters": content.parameters(document),
         "units": units,

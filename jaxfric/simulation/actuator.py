@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..models import Model
-from ..terms.actuator import PREDICTED
+from ..terms.actuator import PREDICTED, REACTION
 from ..terms.base import Sum, summands
 from ..terms.effects import traits
 from ..units import DIMENSIONLESS
@@ -138,7 +138,8 @@ def parted(model: Model, interval: float | None) -> tuple[Model, Actuator | None
     held = None
     if terms:
         held = Model(Sum(terms), jnp.concatenate([alpha for _, alpha in faults]), model.units)
-    return model.without("predicted_"), Actuator(held, model, times["delay"], times["lag"], depth)
+    axis = model.only(lambda term: PREDICTED not in term.coordinates)
+    return axis, Actuator(held, model, times["delay"], times["lag"], depth)
 
 
 def _count(delay: Scalar, interval: float) -> float:
@@ -157,8 +158,15 @@ def _levels(faults: Model) -> Scalar:
 
 
 def check(model: Model) -> None:
-    """Raise `ValueError` for a law that needs less than a tenth of a force as its command."""
+    """Raise `ValueError` for a law that needs less than a tenth of a force as its command, or for
+    friction that takes all of its load.
+    """
     for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+        if REACTION in term.coordinates and not float(jnp.max(jnp.abs(alpha))) < 1:
+            raise ValueError(
+                f"{term.affine[0].name} is {float(alpha[0]):.3g}: an axis whose friction is all of "
+                "its load locks itself. Identify anew, or leave out the term."
+            )
         if PREDICTED not in term.coordinates:
             continue
         for parameter, value in zip(term.affine, alpha, strict=True):

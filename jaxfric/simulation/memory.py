@@ -150,10 +150,13 @@ class Augmented(eqx.Module):
         """The direction of motion, 0 where the axis sticks."""
         one, least = jnp.ones_like(v), slowest(v.dtype)
         ways = [Instant(x, way * least, way * least, way) for way in (one, -one)]
-        forward, backward = (self._resistance(states, way, rest) for way in ways)
-        ahead, back = jnp.broadcast_to(force, (2,)) - self.still.inertia(x, v, rest)[1]
+        needed = jnp.stack([self._resistance(states, way, rest) for way in ways])
+        drift = self.still.inertia(x, v, rest)[1]
+        left = jnp.broadcast_to(force, (2,)) - drift - needed
+        slow = jnp.stack([least, -least])
+        forward, backward = self.still.driving(left, drift, x, slow, rest)
         below, above = self.still.beyond_slip(v.dtype)
-        up, down = ahead > forward + above, back < backward + below
+        up, down = forward > above, backward < below
         breaks = jnp.where(up, 1.0, jnp.where(down, -1.0, 0.0))
         return jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
 
@@ -171,7 +174,9 @@ class Augmented(eqx.Module):
             now = Instant(y[0], y[1], slip, side)
             flowing = [own._replace(flow=f) for own, f in zip(states, again(y[2:]), strict=True)]
             mass, drift = self.still.inertia(y[0], slip, rest)
-            rate = (force - drift - self._resistance(flowing, now, rest)) / (mass - self.shed())
+            left = force - drift - self._resistance(flowing, now, rest)
+            driving = self.still.driving(left[None], drift, y[0], slip[None], rest)[0]
+            rate = driving / (mass - self.shed())
             motion = jnp.stack([y[1], jnp.where(side == 0, 0.0, rate)])
             return jnp.concatenate([motion, *self._flowing(flowing, now)])
 

@@ -9,6 +9,8 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
+from ..terms.actuator import REACTION, carried
+from ..terms.base import AbstractTerm, summands
 
 Scalar = Float[Array, ""]
 
@@ -16,13 +18,19 @@ Scalar = Float[Array, ""]
 class Plant(eqx.Module):
     """M(x) dv/dt = u − F(x, v), read off a model's columns and momentum.
 
+    `reaction`: friction that is a share of what it carries, apart from the rest of the model.
+
     **Arguments:** `model`; `smooth`, the velocity of the smooth approximation of stick-slip, m/s,
     or `None` for the exact law. The break-away levels of the model, where it has them, stand for
     F_slip(0±) at rest, if they are no lower: an axis that broke away at less would stop at once.
     """
 
     model: Model
-    smooth: Scalar | None = None
+    reaction: Model | None
+    smooth: Scalar | None
+
+    def __init__(self, model: Model, smooth: Scalar | None = None):
+        self.model, self.reaction, self.smooth = *split(model), smooth
 
     def resistance(self, position: Scalar, velocity: Float[Array, " k"], rest: "Surroundings"):
         """Force without acceleration at one position and several velocities, N, shape `(k,)`."""
@@ -34,6 +42,25 @@ class Plant(eqx.Module):
         forward, backward = jnp.reshape(laws, sided.shape)
         share = 0.5 * (1 + jnp.tanh(velocity / self.smooth))
         return share * forward + (1 - share) * backward
+
+    def driving(self, left, drift, position: Scalar, velocity: Float[Array, " k"], rest):
+        """What accelerates the axis, N, `(k,)`: of what the actuator has `left` beside drift and
+        resistance, as much as friction that is a share of the load leaves of it.
+
+        Friction carries r, drift and weight and springs and what accelerates, and is μ abs(r).
+        """
+        if self.reaction is None:
+            return left
+        still = [carried(term) for term in summands(self.model.term) for _ in term.affine]
+        motion = rest.motion(position, velocity)
+        borne = drift + self.model.term.columns(motion) @ jnp.where(jnp.asarray(still), self.model.alpha, 0.0)
+        whole = left + borne
+        way = jnp.sign(whole)
+        motion = eqx.tree_at(lambda r: r.channels, motion, motion.channels | {REACTION: way})
+        share = way * _force(self.reaction, motion)
+        if self.smooth is not None:
+            share = share * jnp.abs(jnp.tanh(velocity / self.smooth))
+        return whole / (1 + share) - borne
 
     def inertia(self, position: Scalar, velocity: Scalar, rest: "Surroundings"):
         """Effective inertia ∂p/∂v, and the force (∂p/∂x) v + ∂p/∂t of a momentum that varies."""
@@ -91,16 +118,18 @@ class Plant(eqx.Module):
             along = self.on_side(force, jnp.zeros_like(v), v)
             return jnp.zeros_like(v), self._acceleration(x, v, along, rest)
         least = slowest(v.dtype)
-        moving, forward, backward = self.resistance(x, jnp.stack([v, least, -least]), rest)
         mass, drift = self.inertia(x, v, rest)
-        ahead, back = jnp.broadcast_to(force, (2,)) - drift
+        ways = jnp.stack([v, least, -least])
+        ahead, back = jnp.broadcast_to(force, (2,))
+        given = jnp.stack([self.on_side(force, jnp.sign(v), v), ahead, back])
+        left = given - drift - self.resistance(x, ways, rest)
+        moving, forward, backward = self.driving(left, drift, x, ways, rest)
         below, above = self.beyond_slip(v.dtype)
-        up, down = ahead > forward + above, back < backward + below
+        up, down = forward > above, backward < below
         breaks = jnp.where(up, 1.0, jnp.where(down, -1.0, 0.0))
         side = jnp.where(v == 0, breaks.astype(v.dtype), jnp.sign(v))
-        free = self.on_side(force, side, v) - drift
-        resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, free))
-        return side, (free - jnp.where(v == 0, resting, moving)) / mass
+        resting = jnp.where(side > 0, forward, jnp.where(side < 0, backward, 0.0))
+        return side, jnp.where(v == 0, resting, moving) / mass
 
     def on_side(self, force, side, v):
         """The force that arrives on a side of zero velocity; both, as they blend."""
@@ -126,7 +155,19 @@ class Plant(eqx.Module):
 
     def _acceleration(self, x, v, force, rest):
         mass, drift = self.inertia(x, v, rest)
-        return (force - drift - self.resistance(x, v[None], rest)[0]) / mass
+        left = force - drift - self.resistance(x, v[None], rest)
+        return self.driving(left, drift, x, v[None], rest)[0] / mass
+
+
+def split(model: Model) -> tuple[Model, Model | None]:
+    """A model without friction that is a share of its load, and that friction, if any."""
+
+    def own(term: AbstractTerm) -> bool:
+        return REACTION in term.coordinates
+
+    if not any(map(own, summands(model.term))):
+        return model, None
+    return model.only(lambda term: not own(term)), model.only(own)
 
 
 def _force(model: Model, motion: Recording) -> Float[Array, " k"]:

@@ -16,6 +16,7 @@ from ..data.excerpt import MOST, excerpt
 from ..data.recording import Recording, pad, require, uniform
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
+from ..terms.actuator import PREDICTED, REACTION, carried
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
 from ..terms.presliding import AbstractStates, starts
@@ -191,12 +192,14 @@ def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Arr
 
 
 def with_channels(model: Model, recording: Recording) -> Recording:
-    """A prepared recording with the channel `predicted_force`, if terms of the model read it.
+    """A prepared recording with what the model predicts and terms of it read.
 
     Faults of the actuator act on the force f that the motion needs, N, which the terms without
-    faults predict. A channel that is there already stays.
+    faults predict: `predicted_force`; friction by its load on what of that is no friction:
+    `predicted_reaction`. A channel that is there already stays.
     """
-    if "predicted_force" not in model.term.coordinates - set(recording.channels):
+    wanted = model.term.coordinates & {PREDICTED, REACTION} - set(recording.channels)
+    if not wanted:
         return recording
     sound = model.without("predicted_")
     span = signals.kernel_half_width(recording) * signals.interval(recording)
@@ -205,8 +208,10 @@ def with_channels(model: Model, recording: Recording) -> Recording:
     def rate(signal):
         return signals.local_quadratic(recording, signal, span, reach)[1]
 
-    force = sound.force(recording) + rate(sound.momentum(recording))
-    channels = recording.channels | {"predicted_force": force}
+    channels = dict(recording.channels)
+    for name in wanted:
+        part = sound if name == PREDICTED else sound.only(carried)
+        channels[name] = part.force(recording) + rate(part.momentum(recording))
     return dataclasses.replace(recording, channels=channels)
 
 

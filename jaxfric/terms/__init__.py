@@ -22,7 +22,10 @@ from .effects.frictional_lag import FrictionalLag as FrictionalLag
 from .effects.gain_asymmetry import GainAsymmetry as GainAsymmetry
 from .effects.gravity_unbalance import GravityUnbalance as GravityUnbalance
 from .effects.late import ActuatorLag as ActuatorLag, TransportDelay as TransportDelay
-from .effects.load_dependent_friction import LoadDependentFriction as LoadDependentFriction
+from .effects.load_dependent_friction import (
+    LoadDependentFriction as LoadDependentFriction,
+    ReactionFriction as ReactionFriction,
+)
 from .effects.load_drift import LoadDrift as LoadDrift
 from .effects.parameter_step import ParameterStep as ParameterStep
 from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturbance

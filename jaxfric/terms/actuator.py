@@ -6,4 +6,20 @@ for f, since it would explain itself: the channel `predicted_force` holds f as t
 the fault predicts it from the motion, free of the force's noise.
 """
 
+from .base import AbstractTerm
+
 PREDICTED = "predicted_force"
+REACTION = "predicted_reaction"
+"""The channel of what friction carries: f without the friction in it, as the model predicts it."""
+
+
+def predicted(term: AbstractTerm) -> bool:
+    """Whether a term reads what the rest of its model predicts."""
+    return bool(term.coordinates & {PREDICTED, REACTION})
+
+
+def carried(term: AbstractTerm) -> bool:
+    """Whether guide or screw carry the force of a term: inertia, weight, a spring; not friction,
+    which is a function of the velocity.
+    """
+    return "velocity" not in term.coordinates or "acceleration" in term.coordinates

@@ -84,7 +84,8 @@ class AbstractTerm(eqx.Module):
     def text(self, s: Syntax, *names: str) -> Sequence[str] | None:
         """Its columns at one sample in a language, `names` being those of β; `None` for no text.
 
-        The signals are `x`, `v`, `a`, `t`, and `f` where it reads `predicted_force`.
+        The signals are `x`, `v`, `a`, `t`, and where it reads `predicted_force` or
+        `predicted_reaction` `f` or `r`.
         """
         return None
 

@@ -2,8 +2,9 @@
 
 A law's text is one expression for each column, of the signals `x`, `v`, `a`, `t` (position,
 velocity, acceleration, time), and `f`, the force that the motion needs of a faultless actuator,
-for terms that read the signal `predicted_force`. That text and law agree is tested by compiling the
-one and calling the other.
+for terms that read the signal `predicted_force`; `r`, what of that is no friction, for those that
+read `predicted_reaction`. That text and law agree is tested by compiling the one and calling the
+other.
 """
 
 from collections.abc import Mapping

@@ -105,13 +105,13 @@ SLIPS = with_physics(memories.PRESLIDING, lambda truth: {"presliding_shape": MAX
 
 
 def _reaction(truth, n):
-    return truth["load_friction"] * n.mass * np.abs(n.a) * n.way
+    return truth["reaction_friction"] * n.mass * np.abs(n.a) * n.way
 
 
 REACTION: Kind = curves.LOADED._replace(
-    draw=lambda rng, n, size: scaled(REACTION, "load_friction", {}, n, size, 0.5),
+    draw=lambda rng, n, size: scaled(REACTION, "reaction_friction", {}, n, size, 0.5),
     force=_reaction,
-    physics=lambda truth, base: {"reaction_friction": truth["load_friction"]},
+    physics=lambda truth, base: {"reaction_friction": truth["reaction_friction"]},
     where=lambda truth: "force of inertia by direction",
 )
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...models import Model
+from ...terms.actuator import PREDICTED, REACTION
 from ...terms.base import AbstractTerm
 from ...terms.effect import Effect, inside
 from ...terms.friction import Gaussian
@@ -68,7 +69,8 @@ def _force(truth: Truth, n: Nominal) -> np.ndarray:
 
 def _columns(term: AbstractTerm, n: Nominal) -> np.ndarray:
     """The law's columns along a motion, their momentum differentiated, `(N, p)`."""
-    motion = Recording(n.time, n.u, n.x, n.v, channels={"predicted_force": jnp.asarray(n.u)})
+    channels = {PREDICTED: jnp.asarray(n.u), REACTION: jnp.asarray(n.mass * n.a)}
+    motion = Recording(n.time, n.u, n.x, n.v, channels=channels)
     plain = np.asarray(term.columns(motion), float)
     if not term.inertial:
         return plain

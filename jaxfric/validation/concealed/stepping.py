@@ -200,6 +200,7 @@ def _kick(p, motor, load, memory, now, span, two, more):
         elastic = elastic | (p["smooth_speed"] > 0)
         dry = variants.dry_force(p, way, motor.velocity, memory, level, _side(p, "coulomb", way))
     friction = dry + way * level.wet
+    friction = friction + way * _of_reaction(p, way, free - friction)
     stuck = ~moving & ~elastic & (jnp.abs(free) <= level.dry + level.wet)
     resistance = variants.resistance(p, motor.velocity, level) if more else 0.0
     rate = jnp.where(stuck, 0.0, (free - friction) / (mass + span * resistance))
@@ -284,9 +285,15 @@ def _friction(p, way, v, x, force, memory, now):
         + p["spot"] * spot
         + p["load_friction"] * jnp.abs(force) / (1 + p["load_friction"] * way * jnp.sign(force))
         + p["acceleration_friction"] * fast / (fast + p["acceleration_scale"])
-        + p["reaction_friction"] * p["mass"] * fast
     )
     return _Level(share * dry, share * viscous + extra, base)
+
+
+def _of_reaction(p, way, left):
+    """Friction by the force of inertia r, μ abs(r), where r and it are what is `left`."""
+    return (
+        p["reaction_friction"] * jnp.abs(left) / (1 + p["reaction_friction"] * way * jnp.sign(left))
+    )
 
 
 def _second(p, motor, load, now, span):
