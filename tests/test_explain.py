@@ -24,6 +24,7 @@ from jaxfric.explanation import (
     holdout,
     improvement,
     intervals,
+    least_squares,
     locate,
     mismatch,
     outstanding,
@@ -860,7 +861,10 @@ def test_a_load_is_a_part_of_the_machine(healthy, inertia, is_one):
 def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
     posed = problem.problem_of(healthy[0], models.named("gaussian"))
     term, trial = terms.ElasticBacklash(), types.SimpleNamespace(threshold=0.1)
-    trial.score, trial.candidate = (lambda gain, _: 100 * gain), types.SimpleNamespace(term=term)
+    trial.score, trial.candidate = (
+        (lambda gain, _: 100 * gain),
+        types.SimpleNamespace(term=term),
+    )
     # Friction of 8 N that coasts at 1 m/s² belongs to 8 kg; the machine has 5.
     for friction, coasting, kept in ((8.0, 4.0, 4.0), (8.0, 1.0, 1.6), (80.0, 10.0, None)):
         beta = np.array([2e-4, 1e-4, coasting])
@@ -1514,3 +1518,29 @@ def test_two_stops_for_one_that_stiffens_add_up_and_are_two_terms(healthy):
     places = [finding.parameters["stop_position"] for finding in stops]
     assert len({float(place.standard_error) for place in places}) == len(places)
     assert all(high - 0.01 < float(place.value) < high + deepest for place in places)
+
+
+@pytest.mark.parametrize("height", [-3.0, 3.0])
+def test_a_bump_that_rows_hardly_show_does_not_drive(height):
+    """Two rows on its flank would have it at 3000 N; friction at rest is zero to twice the peak."""
+    rng = np.random.default_rng(0)
+    side, flank = np.sign(rng.normal(size=200)), np.zeros(200)
+    flank[:2] = 1e-3 * side[:2]
+    target = 5 * side + 0.01 * rng.normal(size=200) + 1e3 * height * flank
+    columns, bumps = np.stack([side, flank], axis=1), np.array([False, True])
+    coulomb, bump = least_squares.bounded(columns, target, bumps, np.array([1.0, 0.0]), 8.0)
+    assert coulomb == pytest.approx(5, abs=0.05)
+    assert bump == (pytest.approx(-coulomb) if height < 0 else 8.0)
+
+
+def test_what_a_law_adds_to_dry_friction():
+    both = models.gaussian() + terms.FrictionAsymmetry() + terms.Generalised()
+    moved = types.SimpleNamespace(both_ways=True)
+    bumps, dry = regression._friction([both, terms.PowerLaw()], moved)
+    names = [p.name for p in both.affine]
+    assert [n for n, bump in zip(names, bumps[:-1], strict=True) if bump] == [
+        "stribeck_force+", "stribeck_force-", "stribeck_force",
+    ]  # fmt: skip
+    level = dict(zip(names, dry[:-1], strict=True))
+    assert {n: level[n] for n in names if level[n]} == {"coulomb+": 0.5, "coulomb-": 0.5}
+    assert not regression._friction([both], types.SimpleNamespace(both_ways=False))[1].any()

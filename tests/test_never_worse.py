@@ -339,10 +339,10 @@ def test_a_narrow_bump_is_no_higher_than_the_largest_force():
     target = 3.0 * columns[:, 0] + 0.1 * draw.normal(size=200)
     target[7] += 0.5
     assert abs(least_squares.solve(columns, target)[1]) > 100
-    held = least_squares.bounded(columns, target, np.array([False, True]), 4.0)
+    held = least_squares.bounded(columns, target, np.array([False, True]), np.zeros(2), 4.0)
     assert abs(held[1]) == 4.0 and abs(held[0] - 3.0) < 0.05
     np.testing.assert_allclose(
-        least_squares.bounded(columns, target, np.array([False, False]), 4.0),
+        least_squares.bounded(columns, target, np.array([False, False]), np.zeros(2), 4.0),
         least_squares.solve(columns, target),
     )
 

@@ -60,6 +60,11 @@ class Evidence(NamedTuple):
         """The largest force at the nodes, N."""
         return float(np.nanmax(np.abs(np.asarray(self.motion.force)[: self.nodes])))
 
+    @property
+    def both_ways(self) -> bool:
+        """Whether the axis moves in both directions."""
+        return bool(np.ptp(self.side) > 0)
+
     def project(self, plain: Any, momentum: Any = None) -> np.ndarray:
         """Values at the nodes, `(..., M)`, as rows, `(..., J)`; `momentum` is differentiated."""
         rows = _weigh(np.asarray(plain), self.rows, self.average)

@@ -26,15 +26,31 @@ def solve(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(columns / size, target, rcond=RANK)[0] / size
 
 
-def bounded(columns: np.ndarray, target: np.ndarray, which: np.ndarray, peak: float) -> np.ndarray:
-    """As [`solve`][], some of the coefficients being no larger than `peak`.
+def bounded(
+    columns: np.ndarray, target: np.ndarray, bumps: np.ndarray, dry: np.ndarray, peak: float
+) -> np.ndarray:
+    """As [`solve`][], `bumps` of friction being no larger than `peak`, and no bump taking more than
+    the dry friction that there is, `dry` @ alpha: friction does not drive.
 
     An axis that moved was held by no more friction than the largest force there was. Between
     reversals a filter sees next to nothing of a narrow bump and would take any height for it.
     """
+    alpha = _within(columns, target, bumps, peak)
+    tied = np.zeros(len(alpha), bool)
+    if dry @ alpha <= 0:  # a force with the wrong sign is for others to tell
+        return alpha
+    while (beyond := bumps & ~tied & (alpha < -(dry @ alpha))).any():
+        tied |= beyond
+        joined = columns[:, ~tied] - np.outer(columns[:, tied].sum(axis=1), dry[~tied])
+        alpha[~tied] = _within(joined, target, bumps[~tied], peak)
+        alpha[tied] = -(dry @ alpha)
+    return alpha
+
+
+def _within(columns, target, bumps, peak) -> np.ndarray:
     alpha = solve(columns, target)
     held = np.zeros(len(alpha), bool)
-    while (beyond := which & ~held & (np.abs(alpha) > peak)).any():
+    while (beyond := bumps & ~held & (np.abs(alpha) > peak)).any():
         held |= beyond
         alpha = np.where(held, np.clip(alpha, -peak, peak), 0.0)
         alpha[~held] = solve(columns[:, ~held], target - columns @ alpha)

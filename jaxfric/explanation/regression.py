@@ -7,10 +7,14 @@ nothing is compiled but each term once.
 """
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from functools import cache
+from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
+from ..data.recording import Recording
 from ..terms.base import AbstractTerm, changed_columns, summands
 from ..units import FORCE
 from .evidence import Evidence
@@ -80,15 +84,39 @@ def fast(current: Fit) -> float:
     return float(np.median(np.abs(differences)) / 0.6745 / np.sqrt(2))
 
 
-def _forces_of_bumps(terms: Sequence[AbstractTerm]) -> np.ndarray:
-    """Which affine parameters are forces of friction with a shape that is searched, `(p,)`."""
-    which = [
-        bool(part.nonlinear) and part.coordinates == {"velocity"} and each.dimension == FORCE
-        for term in terms
-        for part in summands(term)
-        for each in part.affine
+def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.ndarray]:
+    """Which affine parameters are forces of friction with a shape that is searched, `(p,)`; and
+    by how much each of the others adds to dry friction, `(p,)`.
+
+    Half of both directions: of motion in one, where nothing is known of it, a constant load is part
+    of what seems to be friction.
+    """
+    parts = [part for term in terms for part in summands(term)]
+    bumps = [
+        part.coordinates == {"velocity"}
+        and each.dimension == FORCE
+        and any(number in changed for changed in changed_columns(part))
+        for part in parts
+        for number, each in enumerate(part.affine)
     ]
-    return np.array(which, bool)
+    if not evidence.both_ways or not any(bumps):
+        return np.array(bumps, bool), np.zeros(len(bumps))
+    dry = np.concatenate([_dry(jax.tree.structure(part)) for part in parts])
+    return np.array(bumps), np.where(bumps, 0.0, dry)
+
+
+@cache
+def _dry(form: Any) -> np.ndarray:
+    """Half the difference of a law's columns beside zero velocity, for friction of velocity; a
+    law's shape is none of it.
+    """
+    part = jax.tree.unflatten(form, [jnp.ones(())] * form.num_leaves)
+    if part.coordinates != {"velocity"}:
+        return np.zeros(len(part.affine))
+    none = jnp.zeros(2)
+    slow = np.sqrt(np.finfo(none.dtype).tiny) * jnp.array([1.0, -1.0])
+    forward, backward = np.asarray(part.columns(Recording(none, none, none, slow)))
+    return np.round(0.5 * (forward - backward), 6)
 
 
 class Beside:
@@ -96,7 +124,7 @@ class Beside:
 
     def __init__(self, evidence: Evidence, basis: np.ndarray):
         self.basis, self.evidence, self.limits = basis, evidence, evidence.limits
-        self.peak = evidence.peak
+        self.peak, self.both_ways = evidence.peak, False  # what is beside has friction too
         self.target = evidence.target - basis @ (basis.T @ evidence.target)
 
     def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
@@ -110,7 +138,7 @@ class Remembered:
 
     def __init__(self, rows: "Evidence | Beside"):
         self.rows, self.limits, self.target = rows, rows.limits, rows.target
-        self.peak = rows.peak
+        self.peak, self.both_ways = rows.peak, rows.both_ways
         self._known: dict[tuple[int, bytes], np.ndarray] = {}
 
     def columns(self, term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
@@ -215,7 +243,7 @@ def _at(terms, evidence, space, point, derivatives=False) -> Fit:
             if i in group
         ]
     whole = np.concatenate(columns, axis=1)
-    alpha = bounded(whole, evidence.target, _forces_of_bumps(terms), evidence.peak)
+    alpha = bounded(whole, evidence.target, *_friction(terms, evidence), evidence.peak)
     residual = evidence.target - whole @ alpha
     ends = np.cumsum([0, *(c.shape[1] for c in columns)])
     alphas = tuple(alpha[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True))

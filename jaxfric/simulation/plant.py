@@ -53,7 +53,8 @@ class Plant(eqx.Module):
             return left
         still = [carried(term) for term in summands(self.model.term) for _ in term.affine]
         motion = rest.motion(position, velocity)
-        borne = drift + self.model.term.columns(motion) @ jnp.where(jnp.asarray(still), self.model.alpha, 0.0)
+        sizes = jnp.where(jnp.asarray(still), self.model.alpha, 0.0)
+        borne = drift + self.model.term.columns(motion) @ sizes
         whole = left + borne
         way = jnp.sign(whole)
         motion = eqx.tree_at(lambda r: r.channels, motion, motion.channels | {REACTION: way})
