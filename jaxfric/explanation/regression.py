@@ -91,7 +91,17 @@ def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.n
     Half of both directions: of motion in one, where nothing is known of it, a constant load is part
     of what seems to be friction.
     """
-    parts = [part for term in terms for part in summands(term)]
+    each = [_bumps_and_dry(jax.tree.structure(term)) for term in terms]
+    bumps, dry = (np.concatenate(parts) for parts in zip(*each, strict=True))
+    return bumps, dry if evidence.both_ways else np.zeros_like(dry)
+
+
+@cache
+def _bumps_and_dry(form: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Of the terms of one form: which columns are bumps, and half the difference of the others
+    beside zero velocity, for friction of velocity.
+    """
+    parts = summands(jax.tree.unflatten(form, [jnp.ones(())] * form.num_leaves))
     bumps = [
         part.coordinates == {"velocity"}
         and each.dimension == FORCE
@@ -99,18 +109,11 @@ def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.n
         for part in parts
         for number, each in enumerate(part.affine)
     ]
-    if not evidence.both_ways or not any(bumps):
-        return np.array(bumps, bool), np.zeros(len(bumps))
-    dry = np.concatenate([_dry(jax.tree.structure(part)) for part in parts])
-    return np.array(bumps), np.where(bumps, 0.0, dry)
+    dry = np.concatenate([_dry(part) for part in parts])
+    return np.array(bumps, bool), np.where(bumps, 0.0, dry)
 
 
-@cache
-def _dry(form: Any) -> np.ndarray:
-    """Half the difference of a law's columns beside zero velocity, for friction of velocity; a
-    law's shape is none of it.
-    """
-    part = jax.tree.unflatten(form, [jnp.ones(())] * form.num_leaves)
+def _dry(part: AbstractTerm) -> np.ndarray:
     if part.coordinates != {"velocity"}:
         return np.zeros(len(part.affine))
     none = jnp.zeros(2)
