@@ -20,6 +20,10 @@ FAULTS = {
     "force ripple": (terms.ForceRipple(), {"pitch": 0.04, "ripple_sin": 0.1, "ripple_cos": -0.05}),
     "dead-band": (terms.ActuatorDeadband(), {"deadband": 2.0}),
     "saturation": (terms.ActuatorSaturation(), {"saturation": 0.3, "knee": 8.0}),
+    "soft saturation": (
+        terms.SoftSaturation(),
+        {"saturation": 1.0, "saturation_level": 25.0},
+    ),
     "load friction": (terms.LoadDependentFriction(), {"load_friction": 0.1}),
     "reaction friction": (terms.ReactionFriction(), {"reaction_friction": 0.2}),
     "gain step": (terms.GainStep(), {"step_gain": 0.1, "step_time": 0.7}),

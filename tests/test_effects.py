@@ -46,6 +46,7 @@ CASES = {
     "cross_axis": (T.CrossAxis(), (0.5, 8.0)),
     "deadband": (T.ActuatorDeadband(), (1.5,)),
     "saturation": (T.ActuatorSaturation(25.0), (0.2,)),
+    "soft_saturation": (T.SoftSaturation(45.0), (0.8,)),
     "gain_asymmetry": (T.GainAsymmetry(), (0.1,)),
     "delay": (T.TransportDelay(), (0.002,)),
     "lag": (T.ActuatorLag(), (0.002,)),
@@ -272,6 +273,8 @@ def test_values_by_hand():
     assert column(T.PowerLaw(3.0, 2.0), at(v=-4.0)) == pytest.approx(-8.0)
     assert column(T.ShearThinning(1.0), at(v=1.0)) == 0.5
     assert column(T.ActuatorSaturation(2.0), at(predicted_force=-5.0)) == -3.0
+    soft = [column(T.SoftSaturation(5.0), at(predicted_force=f)) for f in (-3.0, 4.9, 9.8)]
+    assert soft == pytest.approx([-0.75, 4.9 * (1 / np.sqrt(0.0396) - 1), 2 * soft[1]])
     assert column(T.GainAsymmetry(), at(predicted_force=-5.0)) == 0.0
     assert column(T.LoadDependentFriction("load"), at(v=-1.0, load=-7.0)) == -7.0
     assert column(T.ReactionFriction(), at(v=-1.0, predicted_reaction=-7.0)) == -7.0

@@ -74,6 +74,7 @@ LAWS = {
     "force ripple": terms.ForceRipple(0.2),
     "dead-band": terms.ActuatorDeadband(),
     "saturation": terms.ActuatorSaturation(4.0),
+    "soft saturation": terms.SoftSaturation(4.0),
     "load friction": terms.LoadDependentFriction(),
     "reaction friction": terms.ReactionFriction(),
     "gain step": terms.GainStep(-0.1, ramp=0.3),

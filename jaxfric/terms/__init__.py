@@ -7,7 +7,10 @@ from .base import (
     Sum as Sum,
 )
 from .effects.actuator_deadband import ActuatorDeadband as ActuatorDeadband
-from .effects.actuator_saturation import ActuatorSaturation as ActuatorSaturation
+from .effects.actuator_saturation import (
+    ActuatorSaturation as ActuatorSaturation,
+    SoftSaturation as SoftSaturation,
+)
 from .effects.asymmetric_friction import (
     CoulombAsymmetry as CoulombAsymmetry,
     FrictionAsymmetry as FrictionAsymmetry,

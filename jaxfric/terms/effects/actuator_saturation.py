@@ -1,5 +1,6 @@
 """Gain that falls at high force."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -11,9 +12,10 @@ from ...units import (
 )
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
-from ..effect import Effect
+from ..effect import Effect, Extent
 from ..sample import UNKNOWN, Parameter, Sample
 from ..table import reading
+from ..text import literal
 
 
 def _knee_bounds(scales):
@@ -46,15 +48,58 @@ class ActuatorSaturation(AbstractLaw):
         return (f"{s.call('sign', 'f')} * {beyond}",)
 
 
+def _level_bounds(scales):
+    """From the root-mean-square force, the peak of a square wave, to five times as much: there a
+    peak of twice that is two fifths of the level, and the law a cubic to a tenth.
+    """
+    return scales.force, 5 * scales.force
+
+
+# So far, in parts of the level, and no further: beyond, a command five times as large is straight.
+_NEAR = 0.98
+
+
+class SoftSaturation(AbstractLaw):
+    """Gain that falls gradually: u = f + c f (1/√(1 − (f/L)²) − 1).
+
+    `saturation_level` L, N, is approached and not reached; with c = 1 the actuator gives
+    f = u/√(1 + (u/L)²) (Rapp 1991, of the smoothness 1), as iron that saturates little by little.
+    """
+
+    saturation_level: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("saturation", DIMENSIONLESS),)
+    nonlinear: ClassVar = (Parameter("saturation_level", FORCE, _level_bounds),)
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        force = reading(sample, PREDICTED)
+        used = jnp.minimum((force / self.saturation_level) ** 2, _NEAR**2)
+        return (force * (1 / jnp.sqrt(1 - used) - 1),)
+
+    def text(self, s, level):
+        used = s.call("min", f"f / {level} * f / {level}", literal(_NEAR**2))
+        return (f"f * (1.0 / {s.raised(f'1.0 - {used}', '0.5')} - 1.0)",)
+
+
+def _variant(values: Mapping[str, float], extent: Extent) -> str | None:
+    if "saturation_level" not in values:
+        return None
+    return (
+        "The actuator gives less than commanded, the more the larger the force, and never more "
+        "than {saturation_level}: gradual saturation"
+    )
+
+
 ACTUATOR_SATURATION = Effect(
     "actuator_saturation",
-    "c max(abs(f) − U, 0) sign(f)",
+    "c max(abs(f) − U, 0) sign(f), or c f (1/√(1 − (f/L)²) − 1)",
     "actuator",
     "Above {knee} the actuator gives less than commanded: saturation, {saturation} of the excess",
-    laws=(ActuatorSaturation,),
+    laws=(ActuatorSaturation, SoftSaturation),
     coordinates=("predicted_force",),
     needs=frozenset({"predicted_force"}),
     confusable_with=("gain_asymmetry", "load_dependent_friction"),
     separate_by="Repeat at half the acceleration, below the knee.",
     positive=True,
+    variant=_variant,
 )
