@@ -212,3 +212,23 @@ def test_a_damaged_force_limit_is_refused(value):
     document = axis().to_dict() | {"force_limit": value}
     with pytest.raises(ValueError, match="force_limit|force limit"):
         models.load(json.dumps(document))
+
+
+def test_a_held_force_acts_half_a_sample_after_its_stamp():
+    """A log at 250 Hz, its model exact: all that `predict` leaves is when the force acts."""
+    t = np.arange(4000) / 250.0
+    position = 0.05 * np.sin(2 * np.pi * 0.9 * t) + 0.02 * np.sin(2 * np.pi * 1.7 * t)
+    run = jf.simulate(axis(), jf.Recording(t, 0 * t, position), jf.PD(3000.0, 120.0))
+    at_once, held = axis(), axis().with_force_delay(0.5 / 250)
+    assert force_error(held, run) < 0.1 * force_error(at_once, run)
+    assert force_error(held, run) < force_error(axis().with_force_delay(0.6 / 250), run)
+    # What is simulated holds the force anyhow.
+    again = jf.simulate(held, jf.Recording(t, 0 * t, position), jf.PD(3000.0, 120.0))
+    np.testing.assert_array_equal(again.force, run.force)
+    saved = models.load(json.dumps(held.to_dict()))
+    assert float(saved.force_delay) == 0.002 and "force_delay" in repr(saved)
+    assert "force_delay" not in at_once.to_dict()
+    with pytest.raises(ValueError, match="finite time"):
+        axis().with_force_delay(np.nan)
+    with pytest.raises(ValueError, match="force_delay"):
+        models.load(json.dumps(axis().to_dict() | {"force_delay": 0.002}))

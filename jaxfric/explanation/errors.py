@@ -73,7 +73,7 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
         return dict.fromkeys(("error", "filtered", "values"))
     carried = verification.carried(selection.last, problem.held, selection.rephased)
     again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
-    model = spelled.model(findings.with_late(again), problem.evidence.motion.units)
+    model = findings.model(findings.with_late(again))
     return {
         "error": figures.held(model),
         "filtered": verification.error(again, problem.held),

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import verification
+from ..models import Model
+from . import parameters as spelled, verification
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fit
@@ -102,6 +103,11 @@ class Findings(NamedTuple):
             betas=(*current.betas, *last.betas[-late:]),
             alphas=(*current.alphas, *last.alphas[-late:]),
         )
+
+    def model(self, current: Fit) -> Model:
+        """One of its fits as a model of the force as recorded."""
+        problem = self.undelayed.problem
+        return spelled.model(current, problem.evidence.motion.units, problem.delay)
 
     def holdout_residuals(self, less: Fit, number: int) -> tuple[np.ndarray, np.ndarray]:
         """Residuals of the held-out recording without a finding, and with all of them, N, `(J,)`.

@@ -7,7 +7,7 @@ import numpy as np
 from ..models import Model
 from ..simulation.prediction import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
-from . import parameters as spelled, verification
+from . import verification
 from .acceptance import LEAST_SHARE
 from .figures import Figures
 from .findings import Findings
@@ -118,11 +118,11 @@ def holdout_model(findings: Findings) -> Model:
     """
     problem, selection = findings.undelayed
     there = verification.carried(selection.last, problem.held, selection.rephased)
-    return spelled.model(findings.with_late(there), _units(findings))
+    return findings.model(findings.with_late(there))
 
 
 def _here(findings: Findings, figures: Figures) -> float:
-    error = figures.here(spelled.model(findings.selection.last, _units(findings)))
+    error = figures.here(findings.model(findings.selection.last))
     return error if np.isfinite(error) else np.inf
 
 
@@ -133,7 +133,7 @@ def force_errors(findings: Findings, figures: Figures, delay: float | None = Non
     """
     problem, selection = findings.undelayed
     filtered = verification.error(selection.last, problem.evidence)
-    here = figures.here(spelled.model(findings.selection.last, _units(findings)), delay)
+    here = figures.here(findings.model(findings.selection.last), delay)
     if findings.problem.held is None:
         return Errors(here, None, filtered, None)
     held = figures.held(holdout_model(findings), delay)
@@ -143,9 +143,4 @@ def force_errors(findings: Findings, figures: Figures, delay: float | None = Non
 
 def errors_of_base(base: Findings, findings: Findings, figures: Figures) -> Errors:
     """The force errors of the baseline, over the samples of the model with the findings."""
-    model = spelled.model(findings.selection.last, _units(findings))
-    return force_errors(base, figures, delay_of(model))
-
-
-def _units(findings: Findings):
-    return findings.problem.evidence.motion.units
+    return force_errors(base, figures, delay_of(findings.model(findings.selection.last)))

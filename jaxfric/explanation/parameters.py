@@ -26,9 +26,10 @@ def whole(current: Fit) -> AbstractTerm:
     return Sum(tuple(leaf for term in known for leaf in summands(term)))
 
 
-def model(current: Fit, units) -> Model:
-    """The fit as a model."""
-    return Model(whole(current), jnp.asarray(np.concatenate(current.alphas)), units)
+def model(current: Fit, units, taken_later: float = 0.0) -> Model:
+    """The fit as a model, of rows whose force was taken so much later, s."""
+    known = Model(whole(current), jnp.asarray(np.concatenate(current.alphas)), units)
+    return known.with_force_delay(-taken_later) if taken_later else known
 
 
 def estimates(

@@ -54,8 +54,9 @@ def summarise(
         pictures = [moved_curve(better, wrong), *pictures]
     pairs = sorted(zip(findings, pictures, strict=True), key=lambda pair: -pair[0].share)
     findings = [finding for finding, _ in pairs]
-    models = tuple(
-        spelled.model(current, recording.units) for current in (better.first, selection.last)
+    models = (
+        better.findings.at_base(better.first).model(better.first),
+        better.findings.model(selection.last),
     )
     filtered = filtered_errors(better.findings, better.first)
     if not any(remark.severe for remark in remarks):

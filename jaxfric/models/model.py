@@ -39,7 +39,9 @@ class Model(eqx.Module):
     stiffness σ₀, N/m, and damping σ₁, N·s/m, of LuGre's bristles (`terms.bristles`), shape `(2,)`;
     `None` for friction that jumps at rest. `force_limit`: what the actuator gives at most in either
     direction, N; `None` where nothing is known of it. The force that a motion needs is not cut off
-    there, but of a command no more arrives.
+    there, but of a command no more arrives. `force_delay`: by how much later than its time stamp a
+    recorded force acts, s, as one that is held from sample to sample does by half of one; `predict`
+    gives the force at its stamp. `None` for a force that acts at once.
     """
 
     term: AbstractTerm
@@ -50,6 +52,7 @@ class Model(eqx.Module):
     breakaway: Float[Array, " 2"] | None = None
     bristles: Float[Array, " 2"] | None = None
     force_limit: Float[Array, ""] | None = None
+    force_delay: Float[Array, ""] | None = None
 
     @property
     def parameters(self) -> dict[str, Float[Array, ""]]:
@@ -133,6 +136,15 @@ class Model(eqx.Module):
             raise ValueError(f"The force limit is {limit:g}: a force above zero belongs there.")
         return dataclasses.replace(self, force_limit=jnp.asarray(limit, self.alpha.dtype))
 
+    def with_force_delay(self, delay: float) -> "Model":
+        """The model of a log whose force acts so much later than its time stamp, s; or earlier.
+
+        **Raises:** `ValueError` for a delay that is not finite.
+        """
+        if not math.isfinite(delay):
+            raise ValueError(f"The force delay is {delay:g}: a finite time belongs there.")
+        return dataclasses.replace(self, force_delay=jnp.asarray(delay, self.alpha.dtype))
+
     def arriving(self, command: Float[ArrayLike, "*shape"]) -> Float[Array, "*shape"]:
         """What the actuator gives of commanded forces, N, any shape: all, up to `force_limit`."""
         command = jnp.asarray(command)
@@ -174,6 +186,8 @@ class Model(eqx.Module):
         if self.force_limit is not None:
             unit = dict(self.units)["force"]
             document["force_limit"] = {"value": float(self.force_limit), "unit": unit}
+        if self.force_delay is not None:
+            document["force_delay"] = {"value": float(self.force_delay), "unit": "s"}
         return document
 
     @staticmethod
@@ -197,7 +211,9 @@ class Model(eqx.Module):
         model = from_parameters(term, values, saved.units_of(document.get("units", {})))
         model = _with_levels(model, document.get("breakaway"))
         model = _with_bristles(model, document.get("bristles"))
-        return _with_limit(model, document.get("force_limit"))
+        limit, delay = (_number(document, name) for name in ("force_limit", "force_delay"))
+        model = model if limit is None else model.with_force_limit(limit)
+        return model if delay is None else model.with_force_delay(delay)
 
     def __repr__(self) -> str:
         return text.shown(self, _blocks)
@@ -264,6 +280,8 @@ def _blocks(model: Model) -> Iterator[Block]:
     if model.force_limit is not None:
         most = f"{np.median(model.force_limit):.5g}"
         table.append(["  force_limit", "=", most, units["force"]])
+    if model.force_delay is not None:
+        table.append(["  force_delay", "=", f"{np.median(model.force_delay):.5g}", "s"])
     yield Table(table, (2,))
 
 
@@ -322,13 +340,14 @@ def _with_bristles(model: Model, values: Any) -> Model:
     return model.with_bristles(*pair)
 
 
-def _with_limit(model: Model, value: Any) -> Model:
-    """The model with the force limit of a document, where it has one."""
+def _number(document: Mapping[str, Any], name: str) -> float | None:
+    """A number of a document with its unit, where it has one of that name."""
+    value = document.get(name)
     if value is None:
-        return model
+        return None
     if not isinstance(value, Mapping) or "value" not in value:
         raise ValueError(
-            f"The model document's force_limit is {short(repr(value))}: a force with its value "
-            "belongs there."
+            f"The model document's {name} is {short(repr(value))}: a number with its value belongs "
+            "there."
         )
-    return model.with_force_limit(saved.number("force_limit", value["value"]))
+    return saved.number(name, value["value"])

@@ -169,11 +169,14 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, choice: signals.Cho
 
 
 def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
-    """The model with a delay of zero, and its delay, s; `None` where it has none."""
+    """The model with no delay, and by how much later its force acts, s; `None` for at once."""
     name = next(filter(None, (traits(term).shift for term in summands(model.term))), None)
-    if name is None:
-        return model, None
-    return model.with_parameters({name: 0.0}), model.parameters[name]
+    delay = model.force_delay
+    if name is not None:
+        late = model.parameters[name]
+        delay = late if delay is None else delay + late
+        model = model.with_parameters({name: 0.0})
+    return dataclasses.replace(model, force_delay=None), delay
 
 
 def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:
@@ -292,7 +295,7 @@ def unseen(names: Collection[str], prepared: Prepared, moving: Bool[np.ndarray, 
 
 
 def delay_of(model: Model) -> float:
-    """The dead time of a model, s; zero where it has none."""
+    """By how much later a model's force acts, s: its dead time, and its log's `force_delay`."""
     delay = _at_once(model)[1]
     return 0.0 if delay is None else float(delay)
 

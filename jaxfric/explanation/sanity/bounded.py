@@ -92,7 +92,7 @@ def bounded(
     if not current.energy < limits.LEAVES_IN_ALL * base.energy:
         return None
     first = base if given is None else at_values(given, rows)
-    baseline = spelled.model(first, motion.recording.units)
+    baseline = spelled.model(first, motion.recording.units, problem.delay)
     share = 1 - current.energy / base.energy
     there = None if held is None else with_holdout(problem, held).held
     filtered = [None if each is None else verification.error(first, each) for each in (rows, there)]
