@@ -23,6 +23,8 @@ FINALISTS = 8
 # Refining multiplies a candidate's gain by less than this: neighbouring points of a grid differ by
 # far less than a peak's height. (The most that was seen is 1.8, of a law of three parameters.)
 REFINED = 2.0
+# Of what would have been seen is said what holds for so many of the shapes that were tried.
+MANY = 0.9
 
 
 class Trial(NamedTuple):
@@ -30,7 +32,8 @@ class Trial(NamedTuple):
 
     `gain`: R²; `null_mean`: its mean over the draws; `dimension`: how many of its columns are new;
     `threshold`: the R² from which it is significant; `new_part`: the part of the term's force, in
-    amplitude, that the model cannot imitate; `others`: further local optima of its grid.
+    amplitude, that the model cannot imitate, at all but a tenth of the grid; `others`: further
+    local optima of the grid.
     """
 
     candidate: Candidate
@@ -104,30 +107,24 @@ def contest(
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     bootstrap = BlockBootstrap(current, block, seed)
 
-    def scanned(candidate: Candidate) -> tuple[Scan, np.ndarray]:
-        raw = field.columns(candidate, seen)
-        scan = bootstrap(raw, candidate.effect.positive)
-        return scan, raw[scan.best : scan.best + 1].copy()  # of all the others nothing stays
+    def scanned(candidate: Candidate) -> Scan:
+        return bootstrap(field.columns(candidate, seen), candidate.effect.positive)
 
-    scans, best = zip(*each(scanned, field.candidates), strict=True)
+    scans = each(scanned, field.candidates)
     drawn = np.array([s.drawn for s in scans])
     p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
     least = thresholds(drawn, LEVEL)
     trials = [
-        _trial(bootstrap, candidate, own, scan, float(p), float(limit))
-        for candidate, own, scan, p, limit in zip(
-            field.candidates, best, scans, p_values, least, strict=True
-        )
+        _trial(candidate, scan, float(p), float(limit))
+        for candidate, scan, p, limit in zip(field.candidates, scans, p_values, least, strict=True)
     ]
     fast = fast_tone(seen, current)
     loud = [c for effect, term in tones(seen) for c in at_frequencies(effect, term, fast)]
     for candidate in [*outstanding(seen, current), *loud]:
-        raw = scaled(candidate.columns(seen))
         # Signs of blocks say nothing about single events, nor about a line among thousands: what
         # stands out has been tested.
-        scan = bootstrap(raw)
-        own = raw[scan.best : scan.best + 1]
-        trials.append(_trial(bootstrap, candidate, own, scan, 1 / (1 + DRAWS), np.inf))
+        scan = bootstrap(scaled(candidate.columns(seen)))
+        trials.append(_trial(candidate, scan, 1 / (1 + DRAWS), np.inf))
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
@@ -140,15 +137,19 @@ def contest(
     return Contest(trials, finalists, size)
 
 
-def _trial(bootstrap, candidate, own, scan, p_value, limit) -> Trial:
+def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Trial:
     best = scan.best
-    inside = np.einsum("gkj,glj->gkl", own, bootstrap.new_columns(own)[0])
-    new_part = np.sqrt(np.sum(inside**2) / max(float(np.sum(own**2)), 1e-30))
     return Trial(
         candidate, candidate.betas[best], float(scan.gain[best]), float(scan.null_mean[best]),
-        int(scan.dimension[best]), p_value, limit, float(new_part),
+        int(scan.dimension[best]), p_value, limit, _most(scan.new_part),
         _optima(candidate.betas, scan.gain),
     )  # fmt: skip
+
+
+def _most(new_part: np.ndarray) -> float:
+    """What nearly all shapes that act at all have more of; zero where none does."""
+    acting = new_part[np.isfinite(new_part)]
+    return float(np.quantile(acting, 1 - MANY)) if acting.size else 0.0
 
 
 # Further local optima of a grid from which a law is refined, of at least half the best one's R².

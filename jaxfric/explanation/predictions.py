@@ -58,17 +58,27 @@ def _crossing(force: np.ndarray, command: np.ndarray) -> np.ndarray:
     return np.where(apart, np.finfo(float).tiny * np.sign(command), force)
 
 
+# Nodes apart by which the bend of a derivative is taken: half of what its kernel reaches.
+_BEND = NODES // 2
+
+
 def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
-    """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`."""
+    """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`.
+
+    What the kernel takes off it to second order is put back: of a force that swings within a few
+    kernels that is some per cent, which a saturation would show several times.
+    """
     spacing = evidence.reach / NODES
     tau = np.arange(-NODES, NODES + 1) / NODES
     weight = kernel_slope(tau)
     weight = weight / np.sum(weight * tau * evidence.reach)
     out = np.convolve(values, weight[::-1], "same")
+    cubed = np.sum(weight * (tau * evidence.reach) ** 3) / 6
+    bend = np.roll(out, -_BEND) - 2 * out + np.roll(out, _BEND)
+    out = out - cubed * bend / (_BEND * spacing) ** 2
     # Where the kernel reaches across an interruption, or beyond the ends: the near difference.
-    segment = np.asarray(evidence.motion.segment)
-    before, after = np.roll(segment, NODES), np.roll(segment, -NODES)
-    whole = (before == segment) & (after == segment)
-    whole[:NODES] = whole[-NODES:] = False
+    segment, reach = np.asarray(evidence.motion.segment), NODES + _BEND
+    whole = np.roll(segment, reach) == np.roll(segment, -reach)
+    whole[:reach] = whole[-reach:] = False
     near = np.gradient(values, spacing)
     return np.where(whole, out, near)

@@ -38,13 +38,15 @@ class Scan(NamedTuple):
     """How well each of many groups of columns explains a residual.
 
     `gain`: R² of each, `(G,)`; `null_mean`: mean R² of the draws, `(G,)`; `drawn`: the highest R²
-    of each draw, `(D,)`; `dimension`: columns of each that are new, `(G,)`.
+    of each draw, `(D,)`; `dimension`: columns of each that are new, `(G,)`; `new_part`: the part of
+    each that the model cannot imitate, in amplitude, `(G,)`.
     """
 
     gain: np.ndarray
     null_mean: np.ndarray
     drawn: np.ndarray
     dimension: np.ndarray
+    new_part: np.ndarray
 
     @property
     def best(self) -> int:
@@ -86,14 +88,14 @@ class BlockBootstrap:
         parts = [
             self._chunk(raw[i : i + size], residual, positive) for i in range(0, len(raw), size)
         ]
-        gain, null_mean, drawn, dimension = zip(*parts, strict=True)
+        gain, null_mean, drawn, dimension, new_part = zip(*parts, strict=True)
         return Scan(
             np.concatenate(gain), np.concatenate(null_mean), np.max(drawn, axis=0),
-            np.concatenate(dimension),
+            np.concatenate(dimension), np.concatenate(new_part),
         )  # fmt: skip
 
     def _chunk(self, raw, residual, positive):
-        own, dimension = self.new_columns(raw)
+        own, dimension, new_part = self.new_columns(raw)
         scores, lever = self._by_block(own, residual)
         fitted = scores.sum(axis=2)
         noise = self._unexplained(lever, scores, fitted)
@@ -102,7 +104,8 @@ class BlockBootstrap:
         power = np.einsum("gkd,gkd->gd", drawn, drawn)
         if positive and k == 1:
             fitted = np.maximum(fitted, 0.0)
-        return np.sum(fitted**2, axis=1), power.mean(axis=1), power.max(axis=0), dimension
+        gain = np.sum(fitted**2, axis=1)
+        return gain, power.mean(axis=1), power.max(axis=0), dimension, new_part
 
     def _by_block(self, own, residual):
         """Scores E_bᵀ r_b, `(G, k, B)`, and leverages E_bᵀ E_b, `(G, B, k, k)`, of each block."""
@@ -134,12 +137,16 @@ class BlockBootstrap:
         free = np.linalg.solve(matrix, left[..., None])[..., 0]
         return np.where(alone[:, None], scores, free.transpose(0, 2, 1))
 
-    def new_columns(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Orthonormal columns that each group adds, `(G, k, J)`, and how many, `(G,)`."""
+    def new_columns(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Orthonormal columns that each group adds, `(G, k, J)`, how many, `(G,)`, and the part of
+        the group, in amplitude, that they are, `(G,)`.
+        """
         size = np.sqrt(np.vecdot(raw, raw))
         flat = raw.reshape(-1, raw.shape[2])  # one product instead of one for each group
         own = (flat @ self.basis) @ self.basis.T
         own = np.subtract(flat, own, out=own).reshape(raw.shape)
+        beside, whole = np.vecdot(own, own).sum(axis=1), np.sum(size**2, axis=1)
+        new_part = np.sqrt(beside / np.where(whole > 0, whole, np.nan))
         dimension = np.zeros(len(raw), int)
         for i in range(raw.shape[1]):
             for h in range(i):
@@ -148,7 +155,7 @@ class BlockBootstrap:
             new = left > NEW * size[:, i]
             own[:, i] *= np.where(new, 1 / np.where(new, left, 1.0), 0.0)[:, None]
             dimension += new
-        return own, dimension
+        return own, dimension, new_part
 
 
 def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:

@@ -193,7 +193,7 @@ def smallest_visible(contest: Contest, current: Fit) -> dict[str, float]:
     """The smallest force, N rms in slip, of each effect that would have been found, by effect.
 
     A term is selected if its R² is above that of the highest of all draws and above
-    `LEAST_SHARE`; the least of an effect's shapes counts.
+    `LEAST_SHARE`; the least of an effect's laws counts, and of its shapes nine of ten.
     """
     level = float(np.sqrt(current.energy / len(current.residual)))
     found: dict[str, float] = {}
