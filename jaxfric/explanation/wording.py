@@ -25,6 +25,8 @@ CHANGES = {
 }
 
 
+# Of `unexplained`, where the held-out recording does not bear out what would account for it here.
+REFUTED = "Something is missing, and no effect accounts for it in both recordings."
 # Instead of a verdict's words, where what was measured contradicts itself.
 DOUBTED = "Until that is put right, nothing is named."
 
@@ -41,6 +43,8 @@ def summary(
     severe = [each["text"] for each in warnings if each["severe"]]
     other = [each["text"] for each in warnings if each["name"] == "not_better"]
     words = CHANGES if baseline.startswith("recording") else VERDICTS
+    if verdict == "unexplained" and not_confirmed:
+        words = words | {verdict: REFUTED}
     said = DOUBTED if severe and not findings else words[verdict]
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
     whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings))]

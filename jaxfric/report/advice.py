@@ -43,7 +43,12 @@ def headline(document: Mapping[str, Any]) -> str:
         "explained": f"The model leaves out {shown}, which accounts for the mismatch{errors}.",
         "partly_explained": f"The model leaves out {shown}; that is a part of the mismatch, and "
         f"more is left{errors}.",
-        "unexplained": "Something is missing that no effect of the library accounts for"
+        "unexplained": "Something is missing"
+        + (
+            ", and no effect accounts for it in both recordings"
+            * bool(document.get("not_confirmed"))
+            or " that no effect of the library accounts for"
+        )
         + (f", most of it over {where[0]}" if where else "")
         + f"{errors}.",
     }.get(document["verdict"], f"{spoken(document['verdict'])}{errors}.")
