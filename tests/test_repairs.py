@@ -339,6 +339,7 @@ def test_a_position_that_is_held_between_updates_is_a_curve_through_them(every):
     held = x[np.arange(x.size) // every * every]
     tidy = put_in_order(t, held)
     assert any(f"new at every {every} samples" in text for text in tidy.notes)
+    assert tidy.position_every == every
     inside = slice(None, -every)
     off = np.abs(tidy.signals["position"] - x)[inside]
     assert np.max(off) < 2e-6 and np.max(np.abs(held - x)) > 1e-3  # of six digits

@@ -9,10 +9,12 @@ import pytest
 
 from jaxfric import Recording, explain
 from jaxfric.explanation import evidence, regression, reversals, search, stepwise
+from jaxfric.explanation.inputs import interpolated
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.problem import across_reversals, problem_of
 from jaxfric.models import named
 from jaxfric.terms.effects import EFFECTS
+from jaxfric.validation import concealed
 
 COUNT, RATE = 24000, 1000.0
 TIME = np.arange(COUNT) / RATE
@@ -81,6 +83,17 @@ def test_an_axis_that_yields_is_told_from_one_that_sticks(force_unit, unit):
     for seed in range(3):
         assert yields(yielding(seed=seed, force_unit=force_unit, unit=unit))
         assert not yields(sticking(seed=seed, force_unit=force_unit, unit=unit))
+
+
+def test_a_curve_between_updates_of_the_position_is_no_motion():
+    """It leaves the rest up to two samples before the axis breaks away."""
+    machine = concealed.draw(1462541569, (), (0.1, 0.3), {"log": "held_position"})
+    fresh, _ = interpolated(concealed.record(machine).recording)
+    assert fresh.position_every == 3
+    posed = problem_of(fresh, named(machine.baseline))
+    assert not reversals.yields(fresh, posed.evidence, posed.base)
+    blind = dataclasses.replace(fresh, position_every=1)
+    assert reversals.yields(blind, posed.evidence, posed.base)
 
 
 @pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])

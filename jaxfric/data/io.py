@@ -144,6 +144,7 @@ def read_with_notes(
         units=tuple(named.items()),
         source=source,
         sha256=sha256(path),
+        position_every=tidy.position_every,
     )
     return recording, notes
 

@@ -66,6 +66,8 @@ class Recording(eqx.Module):
     - `units`: names of the force and the position unit, `{"force": "N", "position": "m"}`.
     - `source`: where the recording comes from, for messages; `sha256`: of that file.
     - `num_segments`: a static bound on the number of segments; counted where `None`.
+    - `position_every`: of a position that came at every so many samples only, and is a curve
+      through these since.
 
     **Raises:** `ValueError` if the shapes differ or if neither position nor velocity is given.
     """
@@ -83,6 +85,7 @@ class Recording(eqx.Module):
     source: str = eqx.field(static=True, default="")
     sha256: str = eqx.field(static=True, default="", kw_only=True)
     num_segments: int | None = eqx.field(static=True, default=None)
+    position_every: int = eqx.field(static=True, default=1, kw_only=True)
 
     def __post_init__(self):
         shape = np.shape(self.time)  # equinox converts the fields afterwards: it may be a list
@@ -232,7 +235,7 @@ def uniform(recording: Recording) -> Recording:
     steps = PADDING if power >= LONG else (1, 2)
     length = next(int(f * power) for f in steps if f * power >= recording.num_samples)
     pieces = 1 << (recording.num_segments - 1).bit_length()
-    return dataclasses.replace(pad(recording, length), source="", sha256="", num_segments=pieces)
+    return _anonymous(pad(recording, length), pieces)
 
 
 def stack(recordings: Sequence[Recording]) -> Recording:
@@ -280,4 +283,6 @@ def _kinds(recording: Recording) -> Mapping[str, object]:
 
 
 def _anonymous(recording: Recording, segments: int) -> Recording:
-    return dataclasses.replace(recording, source="", sha256="", num_segments=segments)
+    return dataclasses.replace(
+        recording, source="", sha256="", num_segments=segments, position_every=1
+    )

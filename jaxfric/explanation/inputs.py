@@ -169,7 +169,8 @@ def interpolated(recording: Recording) -> tuple[Recording, list[Remark]]:
         "only, at a lower rate than the force: interpolated by cubics. Log both alike."
     )
     remarks = [Remark("position_held", text, False)]
-    return dataclasses.replace(recording, position=jnp.asarray(fresh)), remarks
+    curve = dataclasses.replace(recording, position=jnp.asarray(fresh), position_every=every)
+    return curve, remarks
 
 
 # What is said of lone samples in other words, as they are left out here.

@@ -49,7 +49,9 @@ def from_position(recording: Recording) -> Recording:
 def derived(recording: Recording) -> Motion:
     """The motion of a recording by its velocity, where it has one."""
     # The name and the number of segments would be compiled in.
-    nameless = dataclasses.replace(recording, source="", sha256="", num_segments=1)
+    nameless = dataclasses.replace(
+        recording, source="", sha256="", num_segments=1, position_every=1
+    )
     bare = without_known(nameless)
     padded, whole = (pad(log, padded_length(recording.num_samples)) for log in (bare, nameless))
     smoothed = 0.0

@@ -102,6 +102,7 @@ def passages(
     """
     motion = motion_of(recording)
     recording, width = motion.recording, evidence.width
+    beyond = recording.position_every - 1
     count = recording.num_samples
     velocity, segment = np.asarray(motion.padded.velocity)[:count], np.asarray(recording.segment)
     position, force = np.asarray(recording.position), np.asarray(recording.force)
@@ -118,6 +119,8 @@ def passages(
         middles = (edges[number : number + 2] + edges[number + 1 : number + 3]) // 2
         first, last = max(stop - width, middles[0]), min(go + width, middles[1])
         at = first + _between(level[first:last], np.sign(velocity[stop]) * position[first:last])
+        # A curve from update to update moves before the axis does, and after.
+        at = at[beyond : len(at) - beyond]
         if len(at) >= LEAST_SAMPLES and np.ptp(level[at]) >= 0.5 * BETWEEN:
             yield at, level[at]
 

@@ -16,12 +16,16 @@ MIN_SAMPLES = 16
 
 
 class Clean(NamedTuple):
-    """Signals without faults: all arrays of shape `(N,)`; `notes` says what was done."""
+    """Signals without faults: all arrays of shape `(N,)`; `notes` says what was done.
+
+    `position_every`: how many samples the position came apart, before it was interpolated.
+    """
 
     signals: dict[str, np.ndarray]
     mask: np.ndarray
     segment: np.ndarray
     notes: list[str]
+    position_every: int = 1
 
 
 def clean(
@@ -43,6 +47,7 @@ def clean(
     **Raises:** `ValueError` if the clock does not run or too few valid samples are left.
     """
     notes: list[str] = []
+    every = 1
     segment = runs(segment) if segment is not None else np.zeros(len(rows), np.int32)
     stamped = np.isfinite(signals["time"])
     if np.count_nonzero(stamped) < MIN_SAMPLES:
@@ -64,10 +69,10 @@ def clean(
             segment = filtered_seams(signals, mask, segment, rows, notes)
         unwrap(signals, mask, segment, rows, notes, period, quiet=len(notes) > told)
         segment = missing_rows(signals, mask, segment, rows, notes)
-        _fresh(signals, segment, notes)
+        every = _fresh(signals, segment, notes)
     elif period is not None:
         unwrap(signals, mask, segment, rows, notes, period)
-    return Clean(signals, mask, segment, notes)
+    return Clean(signals, mask, segment, notes, every)
 
 
 def _in_order(signals, segment, rows, stamped, notes, source):
@@ -87,13 +92,14 @@ def _with_all_stamps(signals, segment, rows, stamped, notes, source):
     return signals | {"time": _filled(signals["time"], ~stamped, segment)}
 
 
-def _fresh(signals, segment, notes) -> None:
-    """A position that comes at a lower rate than the rest, interpolated by cubics."""
+def _fresh(signals, segment, notes) -> int:
+    """A position that comes at a lower rate than the rest, interpolated by cubics; that rate."""
     every = held_for(signals["position"]) if "position" in signals else 1
     if every > 1:
         fresh = between_updates(signals["time"], signals["position"], segment, every)
         signals["position"] = fresh
         notes.append(f"The position is new at every {every} samples only: interpolated by cubics.")
+    return every
 
 
 def _mask(signals, segment, rows, notes, source) -> np.ndarray:
