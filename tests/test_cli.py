@@ -416,3 +416,30 @@ def test_a_real_axis(data_folder, capsys):
     assert values["inertia"] == pytest.approx(95.1, rel=0.02)
     assert values["viscous+"] == pytest.approx(166.7, rel=0.1)
     assert values["viscous-"] == pytest.approx(240.4, rel=0.1)
+
+
+def test_a_held_force_is_aligned_on_request(tmp_path, capsys):
+    t = np.arange(4000) / 250.0
+    values = {"inertia": 5.0, "coulomb+": 20.0, "viscous+": 60.0, "coulomb-": 21.0,
+              "viscous-": 55.0}  # fmt: skip
+    axis = models.from_parameters(models.coulomb_viscous(), values)
+    clock = jaxfric.Recording(t, 0 * t, 0.05 * np.sin(2 * np.pi * 0.9 * t) + 0.02 * np.sin(10 * t))
+    run = jaxfric.simulate(axis, clock, jaxfric.PD(8000.0, 400.0))
+    path, model, out = (str(tmp_path / name) for name in ("log.csv", "model.json", "out.csv"))
+    io.write_table(path, {n: np.asarray(getattr(run, n)) for n in ("time", "position", "force")})
+    told = ["identify", path, "--model", "coulomb-viscous"]
+    assert main(told) == 0
+    printed = capsys.readouterr().out
+    assert "after its time stamp" in printed and "--align" in printed
+    assert main([*told, "--align", "--save", model]) == 0
+    printed = capsys.readouterr().out
+    assert "ms after its time stamp, which is taken into account" in " ".join(printed.split())
+    assert "--align" not in printed
+    saved = json.loads(Path(model).read_text())
+    assert saved["force_delay"]["value"] == pytest.approx(0.002, rel=0.05)
+    # What predict makes of the saved model is at the stamps again.
+    assert main(["predict", model, path, "-o", out]) == 0
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    moving = table["in_motion"] > 0
+    left = (table["measured_force"] - table["force"])[moving]
+    assert np.linalg.norm(left) < 0.01 * np.linalg.norm(table["measured_force"][moving])

@@ -10,7 +10,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.identification.identified import result_names
-from jaxfric.simulation.prediction import relative_error
+from jaxfric.simulation.prediction import force_error, relative_error
 
 RATE = 1000.0
 
@@ -218,7 +218,7 @@ def test_vmap_and_jit_agree_with_a_plain_call():
 @pytest.mark.parametrize(
     "term, told",
     [
-        (jf.terms.GainAsymmetry(), "Identify the rest; jaxfric.explain finds such faults"),
+        (jf.terms.GainAsymmetry(), "Identify the rest; jaxfric.explain finds such terms"),
         (jf.terms.LoadDependentFriction("load"), "needs load, which the recording lacks; it has"),
     ],
 )
@@ -266,3 +266,59 @@ def test_emps_weak_form_and_the_pulses(data_folder):
     symmetric = jf.identify("symmetric-coulomb-viscous", identification, projection=jf.WeakForm(16))
     assert float(symmetric.filtered_force_error) <= 0.042
     assert float(relative_error(symmetric.model, validation, half_width=16)) <= 0.061
+
+
+def held(rate=250.0, key=0, noise=0.2):
+    """A loop that holds its force from sample to sample: it acts half a sample after its stamp."""
+    t = np.arange(int(20 * rate)) / rate
+    position = 0.05 * np.sin(2 * np.pi * 0.9 * t) + 0.02 * np.sin(2 * np.pi * 1.7 * t)
+    model = jf.models.from_parameters(jf.models.coulomb_viscous(), HELD)
+    return jf.simulate(
+        model, jf.Recording(t, 0 * t, position), jf.PD(8000.0, 400.0), force_noise=noise,
+        key=jax.random.key(key),
+    )  # fmt: skip
+
+
+HELD = {"inertia": 5.0, "coulomb+": 20.0, "viscous+": 60.0, "coulomb-": 21.0, "viscous-": 55.0}
+
+
+def off(found):
+    """By how many half-widths of its interval each parameter misses the truth."""
+    names, estimates = found.parameters.keys(), found.parameters.values()
+    halves = [float(e.interval()[1] - e.value) for e in estimates]
+    misses = [float(e.value) - HELD[n] for n, e in zip(names, estimates, strict=True)]
+    return np.abs(np.array(misses) / np.array(halves))
+
+
+@pytest.mark.parametrize("projection", [None, jf.WeakForm(16)])
+def test_a_force_that_is_held_is_told_and_aligned(projection):
+    run = held()
+    plain = jf.identify("coulomb-viscous", run, projection=projection)
+    (remark,) = plain.remarks
+    assert remark.name == "force_stamped" and not remark.severe and "--align" in remark.text
+    assert off(plain).max() > 5
+    found = jf.identify("coulomb-viscous", run, projection=projection, align=True)
+    assert not found.remarks and off(found).max() < 1.3
+    assert float(found.model.force_delay) == pytest.approx(0.5 / 250, rel=0.05)
+    # Then the noise of 0.2 N is all that is left.
+    noise = 0.2 / np.sqrt(np.mean(np.asarray(run.force) ** 2))
+    assert force_error(plain.model, run) > 1.5 * noise
+    assert force_error(found.model, run) == pytest.approx(noise, rel=0.1)
+
+
+def test_rows_of_a_batch_are_aligned_each_by_itself():
+    logs = [held(key=1), held(key=2)]
+    t = logs[1].time
+    # The second log's force is averaged over its sample already: at its stamp it acts.
+    mean = jnp.interp(t - 0.5 / 250, t, logs[1].force)
+    logs[1] = dataclasses.replace(logs[1], force=mean)
+    found = jf.identify("coulomb-viscous", jf.stack(logs), projection=jf.WeakForm(16), align=True)
+    first, second = np.asarray(found.model.force_delay) * 250
+    assert first == pytest.approx(0.5, abs=0.05) and abs(second) < 0.05
+    alone = jf.identify("coulomb-viscous", logs[0], projection=jf.WeakForm(16), align=True)
+    np.testing.assert_allclose(found.model.alpha[0], alone.model.alpha, rtol=1e-6)
+
+
+def test_what_is_traced_is_not_aligned():
+    with pytest.raises(ValueError, match=r"not known inside jax\.jit"):
+        jax.jit(lambda log: jf.identify("coulomb-viscous", log, align=True).model.alpha)(held())

@@ -1,6 +1,13 @@
 """What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
 
-from .fitted import MATTERS as MATTERS, Design as Design, fitted as fitted
+from .fitted import (
+    MATTERS as MATTERS,
+    STAMPED as STAMPED,
+    SURE as SURE,
+    Design as Design,
+    fitted as fitted,
+    lateness as lateness,
+)
 from .kinds import (
     KINDS as KINDS,
     NAMES as NAMES,

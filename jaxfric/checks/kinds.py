@@ -212,6 +212,13 @@ KINDS = (
         "motion were logged with different delays. Shift one of them; jaxfric explain tells more.",
     ),
     Kind(
+        "force_stamped",
+        False,
+        "The force acts {value:.3g} s after its time stamp, as one that is held from sample to "
+        "sample does by half of one: a parameter is off by more than its interval for that. Take "
+        "it into account: --align (in Python align=True).",
+    ),
+    Kind(
         "gain_by_sign",
         False,
         "With {value:.3g} times as much of its positive part the model fits the force with half "

@@ -52,6 +52,11 @@ def _add_identify(commands) -> None:
     )
     options.identifying(command)
     command.add_argument(
+        "--align",
+        action="store_true",
+        help="find by how much the force acts after its time stamp, and take it into account",
+    )
+    command.add_argument(
         "--json", type=values.output, metavar="OUT", help="write the identification; - prints it"
     )
     command.add_argument(

@@ -69,6 +69,7 @@ def fitted(
     model: str,
     projection: str = "auto",
     bounds: Mapping[str, tuple[float, float]] | None = None,
+    align: bool = False,
 ) -> tuple[str, Identified]:
     """The name of the identified model (chosen, where it was `best`) and what was identified."""
     log = uniform(recording) if recording.num_samples <= MOST else recording
@@ -78,7 +79,7 @@ def fitted(
     elif projection == "weak-form":
         chosen = WeakForm(kernel_half_width(prepare(uniform(excerpt(log)))))
     try:
-        found = identify_recording(model, log, projection=chosen, bounds=bounds)
+        found = identify_recording(model, log, projection=chosen, bounds=bounds, align=align)
     except ValueError as error:
         raise ValueError(f"{recording.source}: {error}") from error
     # Arrays of numpy: taking them apart compiles nothing.
@@ -174,7 +175,8 @@ def _identify(path: str, arguments: Namespace) -> dict[str, Any]:
     if name == "best":
         standings = select(recording, path)
         name, chosen = standings.name, {"selection": standings.to_dict()}
-    name, found = fitted(recording, name, arguments.projection, arguments.bounds)
+    how = arguments.projection, arguments.bounds, arguments.align
+    name, found = fitted(recording, name, *how)
     test, stick = constant_velocity(recording, found), breakaway(recording, found)
     error = force_error(found.model, recording)
     document = documents.identification(found, recording, notes, test, error, stick)

@@ -11,6 +11,7 @@ from .. import checks
 from ..checks import Design
 from ..data.recording import Recording
 from . import uncertainty
+from .alignment import usual_interval
 from .identified import Identified, Result, result_names
 
 
@@ -49,7 +50,7 @@ def checked(
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
         row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
         own, time, position, mask = row
-        fitted = checks.fitted(own, float(error))
+        fitted = checks.fitted(own, float(error), half, usual_interval(time, mask))
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
         if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):

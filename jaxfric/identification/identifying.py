@@ -18,12 +18,12 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
-from . import assessment, reduced
+from . import alignment, assessment, reduced
 from .checking import checked, faults
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
-from .setup import set_up
+from .setup import Setup, set_up
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
@@ -37,6 +37,7 @@ def identify(
     projection: AbstractProjection | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     grid: int | None = None,
+    align: bool = False,
     throw: bool = False,
 ) -> Identified:
     """The parameters of a sum of terms from a recording (Kim, Kim & Ha 2004, section III).
@@ -51,17 +52,24 @@ def identify(
       use less than half of the slip time give way to the weak form.
     - `bounds`: lower and upper bound of nonlinear parameters by name; else from the recording.
     - `grid`: points a side of the grid over the nonlinear parameters.
+    - `align`: find by how much the force acts after its time stamp, half a sample for one that is
+      held, and take it into account; the model keeps it as its `force_delay`. Not inside `jax.jit`.
     - `throw`: raise if any result is not successful.
 
     Outside of `jax.jit` the signals and what the model leaves of them are checked too: `warnings`
     and `remarks` of the result, and signals that contradict each other are its `result`. Of more
     than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so.
 
-    **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, and,
-    with `throw`, for any other failure.
+    **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, for
+    `align` inside `jax.jit`, and, with `throw`, for any other failure.
     """
     require(recording, "identify", batch=True)
     traced, batch = signals.is_traced(recording), recording.time.ndim == 2
+    if align and traced:
+        raise ValueError(
+            "align=True looks at the numbers of a fit, which are not known inside jax.jit: "
+            "identify outside, or shift the force first."
+        )
     given = recording.num_samples
     recording = recording if traced or batch else excerpt(recording)
     setup = set_up(
@@ -72,12 +80,31 @@ def identify(
     weak = WeakForm(setup.width)
     if projection is None and setup.projection != weak and _too_open(found):
         found, design = solve(*setup._replace(projection=weak))
+        setup = setup._replace(projection=weak)
+    if align:
+        found, design = _aligned(solve, setup, found, design)
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((found, recording))):
         found = checked(found, design, recording, faults(recording, given))
     if throw:
         raise_unless_successful(found)
     return found
+
+
+def _aligned(solve, setup: Setup, found: Identified, design: Design) -> tuple[Identified, Design]:
+    """The same with the force where it acts, and a model that says by how much that is later."""
+    given = setup.recording
+    delay = np.zeros(given.time.shape[:-1])
+    for _ in range(alignment.ROUNDS):
+        more = alignment.later(design, given)
+        if not more.any():
+            break
+        delay = delay + more
+        found, design = solve(*setup._replace(recording=alignment.at_stamps(given, delay)))
+    model = dataclasses.replace(
+        found.model, force_delay=jnp.asarray(delay, found.model.alpha.dtype)
+    )
+    return eqx.tree_at(lambda f: f.model, found, model), design
 
 
 def _plain(recording: Recording) -> Recording:

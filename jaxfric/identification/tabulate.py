@@ -56,6 +56,10 @@ def identified(
     """The paragraphs and the table of [`identification`][]; the recording may be absent."""
     result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
+    if delay := document.get("model", {}).get("force_delay"):
+        late = "after" if delay["value"] > 0 else "before"
+        span = f"{1e3 * abs(delay['value']):.3g} ms"
+        told.append(f"The force acts {span} {late} its time stamp, which is taken into account.")
     for evidence in ("constant_velocity", "breakaway"):
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
