@@ -181,6 +181,9 @@ def test_a_position_that_is_held_between_updates_is_a_curve_through_them(healthy
     stairs = np.std(np.asarray(seldom.position) - position)
     assert np.std(np.asarray(fresh.position) - position) < 0.05 * stairs
     assert interpolated(healthy[0]) == (healthy[0], [])
+    # Between two updates there is no more than one node.
+    seen = [evidence.gather(motion_of(log), 12) for log in (healthy[0], fresh)]
+    assert [each.width for each in seen] == [12, 24]
 
 
 @pytest.mark.slow

@@ -167,7 +167,8 @@ def gather(
     limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
-    width = int(half_width or _usual(prepared))
+    # Of a position that comes seldom no two nodes lie between the same two updates.
+    width = max(int(half_width or _usual(prepared)), NODES * motion.recording.position_every)
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = _spacing(width)
     span = float(step * NODES * limits.interval)
