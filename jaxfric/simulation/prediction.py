@@ -90,8 +90,26 @@ def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
         momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
     elif any(map(_stepped, summands(model.term))):
         force = partial(_with_smooth_pushes, model, motion)
+    lagging = jnp.zeros(())
+    if any(map(_late, summands(model.term))):
+        # The derivative of a force that holds an acceleration needs more smoothing than that of a
+        # speed: as much as the force has had.
+        lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
+        momentum = model.only(lambda term: not _late(term)).momentum
     rate = _rate(momentum(prepared), prepared, motion.choices[-1])
-    return _later(prepared, force(prepared) + rate, delay)
+    return _later(prepared, force(prepared) + rate + lagging, delay)
+
+
+def _late(term: AbstractTerm) -> bool:
+    """Whether the derivative of the whole force is taken, as of a lag."""
+    return term.inertial and PREDICTED in term.coordinates
+
+
+def _by_kernel(recording: Recording, signal: Float[Array, " N"]) -> Float[Array, " N"]:
+    """The derivative of a signal, smoothed over the kernel that the recording suggests."""
+    reach = signals.kernel_half_width(recording)
+    span = reach * signals.interval(recording)
+    return signals.local_quadratic(recording, signal, span, reach)[1]
 
 
 def _stepped(term: AbstractTerm) -> TypeGuard[AbstractStates]:
@@ -205,16 +223,10 @@ def with_channels(model: Model, recording: Recording) -> Recording:
     if not wanted:
         return recording
     sound = model.without("predicted_")
-    span = signals.kernel_half_width(recording) * signals.interval(recording)
-    reach = signals.kernel_half_width(recording)
-
-    def rate(signal):
-        return signals.local_quadratic(recording, signal, span, reach)[1]
-
     channels = dict(recording.channels)
     for name in wanted:
         part = sound if name == PREDICTED else sound.only(carried)
-        channels[name] = part.force(recording) + rate(part.momentum(recording))
+        channels[name] = part.force(recording) + _by_kernel(recording, part.momentum(recording))
     return dataclasses.replace(recording, channels=channels)
 
 
