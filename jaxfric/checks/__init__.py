@@ -5,6 +5,7 @@ from .fitted import (
     STAMPED as STAMPED,
     SURE as SURE,
     Design as Design,
+    Estimated as Estimated,
     fitted as fitted,
     lateness as lateness,
 )

@@ -40,16 +40,20 @@ class Design(NamedTuple):
     time: Float[Array, " J"]
 
 
-def fitted(
-    design: Design,
-    force_error: float,
-    halves: Float[np.ndarray, " p"] | None = None,
-    interval: float = 0.0,
-) -> np.ndarray:
+class Estimated(NamedTuple):
+    """The first parameters of a design, `alpha`, their intervals' `half`, both `(p,)`, and the
+    `interval` between the samples, s.
+    """
+
+    alpha: Float[np.ndarray, " p"]
+    half: Float[np.ndarray, " p"]
+    interval: float
+
+
+def fitted(design: Design, force_error: float, fit: "Estimated | None" = None) -> np.ndarray:
     """The numbers of the faults that a fit shows, `(W,)`, as [`kinds`][] orders them.
 
-    **Arguments:** `halves`: half of the intervals of the first parameters, `(p,)`; `interval`
-    between samples, s.
+    **Arguments:** `fit`: what was estimated from the design, where that is to be judged too.
     """
     rows = np.flatnonzero(np.asarray(design.weight) > 0)
     columns = np.asarray(design.columns, float)[rows]
@@ -71,8 +75,8 @@ def fitted(
     if not found and energy > MATTERS**2 * power:
         found |= _late(design, rows, basis, energy, power)
         found |= found or _split(columns, target, left, np.asarray(design.time)[rows], power)
-    if known is not None and halves is not None and "force_late" not in found:
-        found |= _stamped(known, halves, interval)
+    if known is not None and fit is not None and "force_late" not in found:
+        found |= _stamped(known, fit, np.asarray(design.columns, float)[rows], target)
     if force_error > LEFT and np.sqrt(energy) > max(LEFT * np.sqrt(power), ROUGH * _rough(left)):
         found["structure_left"] = force_error
     elif force_error > LARGE:
@@ -87,6 +91,8 @@ STAMPED, SURE = 1.5, 4.0
 # By so many intervals a parameter has to be off: to first order, and of the weak form, since closed
 # windows may feel half of it.
 OFF = 2.0
+# Of a parameter that makes less than a fifth of the force a twentieth is no matter.
+PART = 0.2
 # Of a force with less of its power in one sign, a tenth of its size, a gain of that sign would be
 # read off next to nothing.
 ONE_SIGN = 0.01
@@ -193,12 +199,15 @@ def _slightly_late(known: Lateness | None, design: Design, energy, power) -> dic
     return {}
 
 
-def _stamped(known: Lateness, halves, interval: float) -> dict[str, float]:
-    """By how much the force acts after its stamp, where a parameter is off by more than its
-    interval for it.
+def _stamped(known: Lateness, fit: Estimated, columns, target) -> dict[str, float]:
+    """By how much the force acts after its stamp, where a parameter that makes a good part of the
+    force is off for it, by a twentieth and by more than its interval.
     """
-    sure = SURE * known.error < abs(known.time) <= STAMPED * interval
-    off = np.abs(known.moved[: len(halves)]) > OFF * halves
+    moved, forces = np.abs(known.moved[: len(fit.alpha)]), np.linalg.norm(columns, axis=0)
+    sizes = np.abs(fit.alpha) * forces[: len(fit.alpha)]
+    large = sizes > PART * np.linalg.norm(target)
+    off = large & (moved > OFF * fit.half) & (moved > MATTERS * np.abs(fit.alpha))
+    sure = SURE * known.error < abs(known.time) <= STAMPED * fit.interval
     return {"force_stamped": -known.time} if sure and off.any() else {}
 
 

@@ -215,8 +215,8 @@ KINDS = (
         "force_stamped",
         False,
         "The force acts {value:.3g} s after its time stamp, as one that is held from sample to "
-        "sample does by half of one: a parameter is off by more than its interval for that. Take "
-        "it into account: --align (in Python align=True).",
+        "sample does by half of one: a parameter is off by more than a twentieth for that. Take it "
+        "into account: --align (in Python align=True).",
     ),
     Kind(
         "gain_by_sign",

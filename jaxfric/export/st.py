@@ -186,6 +186,6 @@ def _product(line: Line) -> str:
 
 def _word(word: str) -> str:
     """A word of an expression: signals and functions as they are, parameters by their names."""
-    if word in {"x", "v", "a", "t", "f"} or word.isupper() or word.endswith("_SIGN"):
+    if word in set("xvatfr") or word.isupper() or word.endswith("_SIGN"):
         return word
     return word if re.fullmatch(r"e\d*", word) else _name(word)

@@ -50,7 +50,8 @@ def checked(
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
         row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
         own, time, position, mask = row
-        fitted = checks.fitted(own, float(error), half, usual_interval(time, mask))
+        fit = checks.Estimated(alpha, half, usual_interval(time, mask))
+        fitted = checks.fitted(own, float(error), fit)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
         if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
