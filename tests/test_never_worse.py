@@ -365,3 +365,23 @@ def test_identify_says_the_force_error_of_predict(tmp_path, healthy, capsys):
     # Which of the two is the larger depends on the noise and on how the speed varies.
     assert said["filtered_force_error"] > 0
     assert said["filter_half_width"] > 0
+
+
+@pytest.mark.parametrize(("larger", "agree", "worse"), [
+    (0.002, False, False),  # by a few thousandths, as some parts say and others deny
+    (0.002, True, True),  # every part says so
+    (0.02, False, True),  # anybody sees it
+])  # fmt: skip
+def test_what_is_larger_by_chance_alone_is_not_worse(larger, agree, worse):
+    draw = np.random.default_rng(3).normal(size=16)
+    change = np.ones(16) if agree else 1 + 40 * (draw - draw.mean())
+    was = np.full(16, 1.0)
+    ours = was * (1 + 2 * larger * change)
+    errors = [Errors(e, None, 0.05, None, {"here": p})
+              for e, p in ((0.1, was), (0.1 * (1 + larger), ours))]  # fmt: skip
+    assert errors[1].worse(errors[0], 1e-8) == ["here"] * worse
+    # Of a figure without parts nothing is known but itself.
+    alone = [each._replace(parts={}) for each in errors]
+    assert alone[1].worse(alone[0], 1e-8) == ["here"]
+
+

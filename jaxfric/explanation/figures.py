@@ -12,6 +12,9 @@ from ..data.recording import Recording
 from ..models import Model
 from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual, unseen
 
+# Parts of a record that are compared: none shares more than its ends with another.
+PARTS = 16
+
 
 def cast(tree, dtype=float):
     """Every floating-point array in double (or another) precision; anything else as it is."""
@@ -37,7 +40,7 @@ class Figures:
         self._prepared: dict[str, Prepared] = {}
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
-        self._errors: dict[Hashable, float] = {}
+        self._errors: dict[Hashable, tuple[float, np.ndarray]] = {}
 
     def own(self, model: Model) -> Model:
         """The model in the precision of the recording."""
@@ -48,18 +51,25 @@ class Figures:
 
         `delay`: that of another model, s, whose samples the figure is to be taken over.
         """
-        return self._error(model, "here", delay)
+        return self._figure(model, "here", delay)[0]
 
     def held(self, model: Model, delay: float | None = None) -> float:
         """On the held-out recording, of which there has to be one."""
-        return self._error(model, "held", delay)
+        return self._figure(model, "held", delay)[0]
 
-    def _error(self, model: Model, where: str, delay: float | None) -> float:
+    def parts(self, model: Model, where: str, delay: float | None = None) -> np.ndarray:
+        """What the model leaves of each part of the samples of a figure, N², `(PARTS,)`."""
+        return self._figure(model, where, delay)[1]
+
+    def _figure(self, model: Model, where: str, delay: float | None) -> tuple[float, np.ndarray]:
+        """A figure and its parts, computed once."""
         delay = delay_of(model) if delay is None else delay
         key = *self._key(model, where), delay
         if key not in self._errors:
             moving, force = self._samples(where, delay)
-            self._errors[key] = relative(self._left(model, where)[moving], force[moving])
+            left = self._left(model, where)[moving]
+            parts = np.array([float(part @ part) for part in np.array_split(left, PARTS)])
+            self._errors[key] = relative(left, force[moving]), parts
         return self._errors[key]
 
     def as_seen(self, model: Model) -> Model:
