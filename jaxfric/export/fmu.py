@@ -52,7 +52,7 @@ def _source(model: Model, name: str) -> dict[str, str]:
     taken, known = divided(model), _held(model)
     first = len(INPUTS) + len(OUTPUTS)
     rows = [
-        f"    const double {identifier(key)} = r[{first + i}];\n"
+        f"    const double {identifier(key)} = real[{first + i}];\n"
         for i, (key, _, _) in enumerate(known)
     ]
     start = ["0.0"] * first + [literal(value) for _, value, _ in known]

@@ -20,13 +20,13 @@ typedef struct {
 
 @helper@
 /* Outputs from inputs, parameters and time. */
-static void evaluate(double *r, double time)
+static void evaluate(double *real, double time)
 {
-    const double x = r[0], v = r[1], a = r[2], t = time;
+    const double x = real[0], v = real[1], a = real[2], t = time;
 @parameters@    double u = 0.0;
 
-@friction@    r[3] = u;
-@rest@    r[4] = u;
+@friction@    real[3] = u;
+@rest@    real[4] = u;
     (void)x, (void)v, (void)a, (void)t;
 }
 
