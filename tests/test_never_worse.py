@@ -383,5 +383,3 @@ def test_what_is_larger_by_chance_alone_is_not_worse(larger, agree, worse):
     # Of a figure without parts nothing is known but itself.
     alone = [each._replace(parts={}) for each in errors]
     assert alone[1].worse(alone[0], 1e-8) == ["here"]
-
-

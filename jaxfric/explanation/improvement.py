@@ -1,4 +1,4 @@
-"""After is never worse than before: findings go until the model that is saved is no worse."""
+"""After is never worse than before but by chance: findings go until the saved model is no worse."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -91,17 +91,20 @@ def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.n
     Half of both directions: of motion in one, where nothing is known of it, a constant load is part
     of what seems to be friction.
     """
-    each = [_bumps_and_dry(jax.tree.structure(term)) for term in terms]
+    each = [
+        _bumps_and_dry(jax.tree.structure(term), tuple(map(np.shape, jax.tree.leaves(term))))
+        for term in terms
+    ]
     bumps, dry = (np.concatenate(parts) for parts in zip(*each, strict=True))
     return bumps, dry if evidence.both_ways else np.zeros_like(dry)
 
 
 @cache
-def _bumps_and_dry(form: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Of the terms of one form: which columns are bumps, and half the difference of the others
-    beside zero velocity, for friction of velocity.
+def _bumps_and_dry(form: Any, shapes: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, ...]:
+    """Of the terms of one form, with leaves of those `shapes`: which columns are bumps, and half
+    the difference of the others beside zero velocity, for friction of velocity.
     """
-    parts = summands(jax.tree.unflatten(form, [jnp.ones(())] * form.num_leaves))
+    parts = summands(jax.tree.unflatten(form, [jnp.ones(shape) for shape in shapes]))
     bumps = [
         part.coordinates == {"velocity"}
         and each.dimension == FORCE

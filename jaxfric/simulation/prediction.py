@@ -86,16 +86,16 @@ def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     prepared = with_channels(model, motion.recording)
     momentum: Callable[[Recording], Array | np.ndarray] = model.momentum
     force: Callable[[Recording], Array | np.ndarray] = model.force
-    if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
-        momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
-    elif any(map(_stepped, summands(model.term))):
-        force = partial(_with_smooth_pushes, model, motion)
     lagging = jnp.zeros(())
     if any(map(_late, summands(model.term))):
         # The derivative of a force that holds an acceleration needs more smoothing than that of a
         # speed: as much as the force has had.
         lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
         momentum = model.only(lambda term: not _late(term)).momentum
+    if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
+        momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
+    elif any(map(_stepped, summands(model.term))):
+        force = partial(_with_smooth_pushes, model, motion)
     rate = _rate(momentum(prepared), prepared, motion.choices[-1])
     return _later(prepared, force(prepared) + rate + lagging, delay)
 
@@ -225,6 +225,9 @@ def with_channels(model: Model, recording: Recording) -> Recording:
     sound = model.without("predicted_")
     channels = dict(recording.channels)
     for name in wanted:
+        if name == REACTION and not any(map(carried, summands(sound.term))):
+            channels[name] = jnp.zeros_like(recording.time)
+            continue
         part = sound if name == PREDICTED else sound.only(carried)
         channels[name] = part.force(recording) + _by_kernel(recording, part.momentum(recording))
     return dataclasses.replace(recording, channels=channels)
