@@ -86,7 +86,7 @@ def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     prepared = with_channels(model, motion.recording)
     momentum: Callable[[Recording], Array | np.ndarray] = model.momentum
     force: Callable[[Recording], Array | np.ndarray] = model.force
-    lagging = jnp.zeros(())
+    lagging = jnp.zeros_like(prepared.time)
     if any(map(_late, summands(model.term))):
         # The derivative of a force that holds an acceleration needs more smoothing than that of a
         # speed: as much as the force has had.
