@@ -2,8 +2,6 @@
 
 from .fitted import (
     MATTERS as MATTERS,
-    STAMPED as STAMPED,
-    SURE as SURE,
     Design as Design,
     Estimated as Estimated,
     fitted as fitted,

@@ -50,7 +50,7 @@ class Estimated(NamedTuple):
     interval: float
 
 
-def fitted(design: Design, force_error: float, fit: "Estimated | None" = None) -> np.ndarray:
+def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> np.ndarray:
     """The numbers of the faults that a fit shows, `(W,)`, as [`kinds`][] orders them.
 
     **Arguments:** `fit`: what was estimated from the design, where that is to be judged too.
@@ -156,6 +156,13 @@ class Lateness(NamedTuple):
     gain: float
     shape: float
 
+    def sure(self, interval: float) -> bool:
+        """Whether it is told from none, and what a hold or a cycle of a controller makes.
+
+        `interval` between the samples, s.
+        """
+        return SURE * self.error < abs(self.time) <= STAMPED * interval
+
 
 def lateness(design: Design) -> Lateness | None:
     """The [`Lateness`][] that the rows of a fit show; `None` where they cannot.
@@ -207,8 +214,7 @@ def _stamped(known: Lateness, fit: Estimated, columns, target) -> dict[str, floa
     sizes = np.abs(fit.alpha) * forces[: len(fit.alpha)]
     large = sizes > PART * np.linalg.norm(target)
     off = large & (moved > OFF * fit.half) & (moved > MATTERS * np.abs(fit.alpha))
-    sure = SURE * known.error < abs(known.time) <= STAMPED * fit.interval
-    return {"force_stamped": -known.time} if sure and off.any() else {}
+    return {"force_stamped": -known.time} if known.sure(fit.interval) and off.any() else {}
 
 
 def _late(design: Design, rows, basis, energy, power) -> dict[str, float]:

@@ -5,6 +5,7 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
+from ..data.shifting import shifted
 from ..terms import KNOWN_FORCE, KNOWN_REST
 from ..terms.sample import Scales
 from .motion import padded_length
@@ -37,7 +38,7 @@ def node_signals(
         series["position"] = np.asarray(recording.position, float)
     series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
     if delay:
-        series["force"] = _shifted(time, series["force"], run, delay)
+        series["force"] = _later(time, series["force"], run, delay)
     centres = np.arange(0, len(time), step)
     offsets = np.arange(-(step - 1), step)
     at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
@@ -67,16 +68,11 @@ def node_signals(
     return means | {"run": label}
 
 
-def _shifted(time, force, run, delay):
-    """The force `delay` later, s: u(t + delay), inside each run."""
-    late = np.interp(time + delay, time, force) if np.all(np.diff(time) > 0) else None
-    if late is not None:
-        return late
-    out = np.empty_like(force)
-    for label in np.unique(run):
-        own = run == label
-        out[own] = np.interp(time[own] + delay, time[own], force[own])
-    return out
+def _later(time, force, run, delay):
+    """The force `delay` later, s: u(t + delay), inside each run; across them on an even clock."""
+    if np.all(np.diff(time) > 0):
+        return np.interp(time + delay, time, force)
+    return shifted(time, force, run, delay)
 
 
 def windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:

@@ -7,11 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from .. import checks
+from .. import checks, signals
 from ..checks import Design
 from ..data.recording import Recording
 from . import uncertainty
-from .alignment import usual_interval
 from .identified import Identified, Result, result_names
 
 
@@ -39,7 +38,7 @@ def checked(
     """
     warnings = np.array(faults, ndmin=2)
     names, batch = found.names[: len(found.model.term.affine)], faults.ndim == 2
-    host = jax.tree.map(np.asarray, (design, recording.time, recording.position, recording.mask))
+    host = jax.tree.map(np.asarray, (design, recording))
     alphas, matrices, errors = (
         np.array(x, float, ndmin=n)
         for x, n in ((found.model.alpha, 2), (found.covariance, 3), (found.filtered_force_error, 1))
@@ -49,12 +48,14 @@ def checked(
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
         row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
-        own, time, position, mask = row
-        fit = checks.Estimated(alpha, half, usual_interval(time, mask))
+        own, log = row
+        fit = checks.Estimated(alpha, half, signals.host_interval(log))
         fitted = checks.fitted(own, float(error), fit)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
-        if np.isnan(fitted[STRUCTURE]) and checks.hides(own, time, position, mask, alpha, sure):
+        if np.isnan(fitted[STRUCTURE]) and checks.hides(
+            own, log.time, log.position, log.mask, alpha, sure
+        ):
             fitted[STRUCTURE] = error
         warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         if negative := int(np.sum((alpha + half)[passive] < 0)):

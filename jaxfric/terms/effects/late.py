@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ...data.recording import Recording
+from ...data.shifting import shifted
 from ...units import TIME
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
@@ -49,13 +50,8 @@ FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quart
 
 def earlier(motion: Recording, delay: float) -> Recording:
     """The force taken `delay`, s, later: what acted then."""
-    time, force = np.asarray(motion.time), np.asarray(motion.force)
-    moved = np.empty_like(force)
-    segment = np.asarray(motion.segment)
-    for label in np.unique(segment):
-        own = segment == label
-        moved[own] = np.interp(time[own] - delay, time[own], force[own])
-    return dataclasses.replace(motion, force=jnp.asarray(moved))
+    time, force, segment = map(np.asarray, (motion.time, motion.force, motion.segment))
+    return dataclasses.replace(motion, force=jnp.asarray(shifted(time, force, segment, -delay)))
 
 
 def lagged(motion: Recording, lag: float) -> Recording:
