@@ -163,7 +163,8 @@ def test_the_sandwich_of_white_noise_is_the_classical_covariance():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "expected"), [(3, 3.1824), (5, 2.5706), (10, 2.2281), (28, 2.0484)]
+    ("degrees", "expected"),
+    [(1, 12.7062), (2, 4.3027), (3, 3.1824), (5, 2.5706), (10, 2.2281), (28, 2.0484)],
 )
 def test_student_quantile(degrees, expected):
     np.testing.assert_allclose(uncertainty.student_quantile(0.975, degrees), expected, rtol=5e-3)

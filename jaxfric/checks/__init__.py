@@ -4,6 +4,7 @@ from .fitted import (
     MATTERS as MATTERS,
     Design as Design,
     Estimated as Estimated,
+    Lateness as Lateness,
     fitted as fitted,
     lateness as lateness,
 )

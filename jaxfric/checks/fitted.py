@@ -41,13 +41,14 @@ class Design(NamedTuple):
 
 
 class Estimated(NamedTuple):
-    """The first parameters of a design, `alpha`, their intervals' `half`, both `(p,)`, and the
-    `interval` between the samples, s.
+    """The first parameters of a design, `alpha`, their intervals' `half`, both `(p,)`, the
+    `interval` between the samples, s, and by how much the force is late, if that is known.
     """
 
     alpha: Float[np.ndarray, " p"]
     half: Float[np.ndarray, " p"]
     interval: float
+    lateness: "Lateness | None" = None
 
 
 def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> np.ndarray:
@@ -69,7 +70,7 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
         return places({})
     # What turns the columns into each other takes little off the residual and much from the truth.
     basis = np.linalg.qr(columns)[0]
-    known = lateness(design)
+    known = lateness(design) if fit is None else fit.lateness
     found = _slightly_late(known, design, energy, power)
     found |= found or _gain(basis, target, left)
     if not found and energy > MATTERS**2 * power:
@@ -146,13 +147,14 @@ def _least(columns: np.ndarray, target: np.ndarray) -> float:
 class Lateness(NamedTuple):
     """By how much a recorded force is late, s (early below zero): u(t + τ) = u + τ du/dt.
 
-    `error`, s, of the time, by parts of the record; `moved`, by how much it shifts the parameters,
-    `(P,)`; `gain`, the energy, N², that it would remove; `shape`, that of the slope, N²/s².
+    `error`, s, of the time, by parts of the record; `shift`, by how much each second of it shifts
+    the parameters, `(P,)`; `gain`, the energy, N², that it would remove; `shape`, that of the
+    slope, N²/s².
     """
 
     time: float
     error: float
-    moved: Float[np.ndarray, " P"]
+    shift: Float[np.ndarray, " P"]
     gain: float
     shape: float
 
@@ -189,9 +191,7 @@ def lateness(design: Design) -> Lateness | None:
     late = -part / power
     rest = own * (left + late * own)
     sums = np.add.reduceat(rest, np.arange(PARTS) * len(rows) // PARTS)
-    return Lateness(
-        late, float(np.sqrt(sums @ sums)) / power, -late * taken, part**2 / power, shape
-    )
+    return Lateness(late, float(np.sqrt(sums @ sums)) / power, -taken, part**2 / power, shape)
 
 
 def _slightly_late(known: Lateness | None, design: Design, energy, power) -> dict[str, float]:
@@ -210,7 +210,8 @@ def _stamped(known: Lateness, fit: Estimated, columns, target) -> dict[str, floa
     """By how much the force acts after its stamp, where a parameter that makes a good part of the
     force is off for it, by a twentieth and by more than its interval.
     """
-    moved, forces = np.abs(known.moved[: len(fit.alpha)]), np.linalg.norm(columns, axis=0)
+    moved = np.abs(known.time * known.shift[: len(fit.alpha)])
+    forces = np.linalg.norm(columns, axis=0)
     sizes = np.abs(fit.alpha) * forces[: len(fit.alpha)]
     large = sizes > PART * np.linalg.norm(target)
     off = large & (moved > OFF * fit.half) & (moved > MATTERS * np.abs(fit.alpha))

@@ -32,7 +32,8 @@ def faults(recording: Recording, given: int | None = None) -> np.ndarray:
 def checked(
     found: Identified, design: Design, recording: Recording, faults: np.ndarray
 ) -> Identified:
-    """What was identified with its warnings; a severe one makes a row contradictory.
+    """What was identified with its warnings, and with the error that a force late by less than two
+    samples makes in its covariance; a severe warning makes a row contradictory.
 
     `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
     """
@@ -45,12 +46,16 @@ def checked(
     )
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
+    delayed = found.model.force_delay is not None
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
         row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
         own, log = row
-        fit = checks.Estimated(alpha, half, signals.host_interval(log))
+        late, interval = checks.lateness(own), signals.host_interval(log)
+        fit = checks.Estimated(alpha, half, interval, late)
         fitted = checks.fitted(own, float(error), fit)
+        if late is not None:
+            matrices[i] += _by_lateness(late, interval, delayed, len(matrices[i]))
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
         if np.isnan(fitted[STRUCTURE]) and checks.hides(
@@ -64,8 +69,24 @@ def checked(
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
     warnings = warnings.reshape(faults.shape).astype(np.asarray(found.filtered_force_error).dtype)
     return dataclasses.replace(
-        found, warnings=jnp.asarray(warnings), result=_contradicted(found.result, wrong)
+        found,
+        covariance=jnp.asarray(matrices.reshape(found.covariance.shape), found.covariance.dtype),
+        warnings=jnp.asarray(warnings),
+        result=_contradicted(found.result, wrong),
     )
+
+
+def _by_lateness(late: checks.Lateness, interval: float, delayed: bool, count: int) -> np.ndarray:
+    """The covariance of the parameters, `(P, P)`, for not knowing when the force acts.
+
+    Whether it is held or its stamp is right is not known: all of a sure lateness is an error. Where
+    a delay was found, that it was found is.
+    """
+    found = np.zeros((count, count))
+    time = late.time if late.sure(interval) else late.error if delayed else 0.0
+    shift, known = time * late.shift, len(late.shift)  # closed windows: of the affine ones alone
+    found[:known, :known] = np.outer(shift, shift)
+    return found
 
 
 STRUCTURE = checks.NAMES.index("structure_left")
