@@ -331,6 +331,16 @@ def test_rows_of_a_batch_are_aligned_each_by_itself():
     np.testing.assert_allclose(found.model.alpha[0], alone.model.alpha, rtol=1e-6)
 
 
+def test_a_force_at_its_stamp_stays_there():
+    run = held()
+    model = jf.models.from_parameters(jf.models.coulomb_viscous(), HELD)
+    noise = 0.2 * np.random.default_rng(0).normal(size=run.num_samples)
+    run = dataclasses.replace(run, force=jf.predict(model, run) + noise)
+    found = jf.identify("coulomb-viscous", run, align=True)
+    assert float(found.model.force_delay) == 0.0
+    assert "The force acts at its time stamp, as far as the log shows." in repr(found)
+
+
 def test_what_is_traced_is_not_aligned():
     with pytest.raises(ValueError, match=r"not known inside jax\.jit"):
         jax.jit(lambda log: jf.identify("coulomb-viscous", log, align=True).model.alpha)(held())

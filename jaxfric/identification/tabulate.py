@@ -48,6 +48,13 @@ def identification(
     return text(identified(document, truth, automatic))
 
 
+def _when(delay: float) -> str:
+    if not delay:
+        return "The force acts at its time stamp, as far as the log shows."
+    span, late = f"{1e3 * abs(delay):.3g} ms", "after" if delay > 0 else "before"
+    return f"The force acts {span} {late} its time stamp, which is taken into account."
+
+
 def identified(
     document: Mapping[str, Any],
     truth: Mapping[str, float] | None = None,
@@ -57,9 +64,7 @@ def identified(
     result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
     if delay := document.get("model", {}).get("force_delay"):
-        late = "after" if delay["value"] > 0 else "before"
-        span = f"{1e3 * abs(delay['value']):.3g} ms"
-        told.append(f"The force acts {span} {late} its time stamp, which is taken into account.")
+        told.append(_when(delay["value"]))
     for evidence in ("constant_velocity", "breakaway"):
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
