@@ -45,6 +45,7 @@ from jaxfric.explanation import (
     timing,
     verdict,
     verification,
+    wording,
 )
 from jaxfric.explanation.finding import Finding
 from jaxfric.explanation.inputs import interpolated
@@ -612,6 +613,26 @@ def test_values_that_do_not_carry_over_are_said_to(healthy):
         both.fit["filtered_holdout_refitted_error"], rel=0.2
     )
     assert explain(healthy[0]).fit["holdout_refitted_error"] is None
+
+
+@pytest.mark.parametrize(
+    "effect, held, noise, told",
+    [
+        ("friction_step", 0.11, 0.01, True),
+        ("friction_step", 0.03, 0.01, False),  # it acts there too
+        ("friction_step", 0.11, 0.09, False),  # noise
+        ("cogging", 0.11, 0.01, False),
+    ],
+)
+def test_what_acts_at_a_moment_says_nothing_of_the_held_out_recording(effect, held, noise, told):
+    finding = types.SimpleNamespace(effect=effect)
+    fit = {
+        "force_error": {"before": 0.10, "after": 0.012},
+        "holdout_force_error": {"before": 0.12, "after": held},
+        "noise_floor": noise,
+    }
+    said = wording.summary("explained", "gaussian", [finding], [], fit, [])
+    assert ("friction step acted at a time of this recording" in said) is told
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..terms.effects import EFFECTS
 from .finding import Finding
 
 VERDICTS = {
@@ -48,7 +49,7 @@ def summary(
     said = DOUBTED if severe and not findings else words[verdict]
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
     whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings))]
-    return " ".join([*whole, *_not_determined(fit)])
+    return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit))])
 
 
 def _not_confirmed(findings: Sequence[Finding]) -> str:
@@ -127,6 +128,27 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
     return [
         f"{text}this recording does not determine the values that hold there. Identify on one that "
         "moves like both."
+    ]
+
+
+# More than half of a mismatch's size is most of it; so it is not what was found here, of which less
+# than half is left.
+MOST = 0.5
+
+
+def _of_a_moment(findings: Sequence[Finding], fit: Mapping[str, Any]) -> list[str]:
+    """That what is tied to the time of this recording leaves the held-out one as it was."""
+    names = [f.effect.replace("_", " ") for f in findings if EFFECTS[f.effect].momentary]
+    pairs = [fit.get("force_error"), fit.get("holdout_force_error")]
+    if not names or any(pair is None for pair in pairs):
+        return []
+    here, held = (pair["after"] / max(pair["before"], 1e-300) for pair in pairs)
+    noise = pairs[1]["after"] < ELSEWHERE * (fit.get("noise_floor") or 0.0)
+    if here > MOST or held < MOST or noise:
+        return []
+    return [
+        f"But {' and '.join(names)} acted at a time of this recording and says nothing of the "
+        f"held-out one, where {pairs[1]['after']:.2%} is left: explain that one by itself."
     ]
 
 
