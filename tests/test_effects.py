@@ -17,6 +17,7 @@ from jaxfric.simulation.control import PD, Encoder
 from jaxfric.simulation.simulating import simulate
 from jaxfric.terms import effects, transmission
 from jaxfric.terms.base import bounds
+from jaxfric.terms.effect import Extent
 from jaxfric.terms.sample import Scales
 from jaxfric.units import Dimension, spell
 
@@ -250,6 +251,15 @@ def at(t=0.0, x=0.0, v=1.0, **channels):
 
 def column(term, recording, k=0):
     return float(term.columns(recording)[0, k])
+
+
+def test_a_wave_that_does_not_repeat_within_the_stroke_may_be_an_unbalance():
+    recording = Recording(jnp.arange(4.0), jnp.zeros(4), jnp.array([0.0, 0.3, 0.1, 0.2]))
+    scales = signals.scales(signals.prepare(recording))
+    low, high = (float(x) for x in T.GravityUnbalance().nonlinear[0].bounds(scales))
+    extent, slowly = Extent(0.0, 0.3), effects.EFFECTS["cogging"].variant
+    assert slowly({"pitch": 1.01 * low}, extent) and not slowly({"pitch": 0.99 * low}, extent)
+    assert high > 1.0
 
 
 @pytest.mark.slow

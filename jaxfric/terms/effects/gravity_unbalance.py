@@ -10,7 +10,7 @@ from ...units import (
     POSITION,
 )
 from ..base import AbstractLaw
-from ..effect import Effect, slowly
+from ..effect import REPEATED, Effect, slowly
 from ..position import (
     POSITION_ONLY,
     stroke,
@@ -21,12 +21,12 @@ from ..sample import UNKNOWN, Parameter, Resolution, Sample
 
 
 def _long_bounds(scales):
-    """From the longest period that repeats within the stroke to eight strokes.
+    """From the longest period that repeats within the stroke, [`REPEATED`][], to eight strokes.
 
     There the sine spans ±π/8 about its middle and differs from a parabola by (π/8)³/6 = 1 %: a
     longer period can no longer be told.
     """
-    return stroke(scales), 8 * stroke(scales)
+    return stroke(scales) / REPEATED, 8 * stroke(scales)
 
 
 # Less than a cycle: what is told apart are the curvatures of its pieces, not their phases.
