@@ -51,6 +51,13 @@ def test_points_are_the_friction_at_the_speeds_held():
     assert all(abs(g.low) < 0.02 or abs(g.high) < 0.08 for g in test.not_evaluated)
 
 
+def test_a_dead_sensor_contradicts_no_curve():
+    recording = staircase(bumped)
+    dead = dataclasses.replace(recording, force=np.full(recording.num_samples, 3.0))
+    test = jf.constant_velocity(dead, jf.identify("coulomb-viscous", dead))
+    assert test.points and not test.contradicted
+
+
 @pytest.mark.slow
 def test_a_curve_that_is_too_simple_is_contradicted_and_the_right_one_is_not():
     recording = staircase(bumped)

@@ -1428,6 +1428,11 @@ def test_terms_that_share_what_they_remove_stand_in_for_another():
     assert not verdict.stand_ins([0.3, 0.1], 0.9)
 
 
+def test_what_halves_the_residual_is_no_chance_though_another_recording_refutes_it():
+    assert verdict.halved([types.SimpleNamespace(share=0.8)])
+    assert not verdict.halved([types.SimpleNamespace(share=0.4)] * 2) and not verdict.halved([])
+
+
 def both_ways(values, errors, names=("force",) * 2, joined=parameters.with_elsewhere):
     """The standard error of the first of two estimates once the second is known."""
     one, other = (

@@ -196,7 +196,7 @@ def test_a_healthy_log_is_right_without_a_word(pair, command, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("unseen", [False, True], ids=["seen", "unseen"])
 def test_no_wrong_answer_in_silence(unseen, command, tmp_path):
-    """A case of every other kind on the machines, and on those that no threshold was made on.
+    """A case of every fourth kind on the machines, and on those that no threshold was made on.
 
     The aim is none in silence. Measured on fresh cases are 0 of 200 on unseen machines and 2 of 113
     on the others (a force held for a sample beside a light axis; a gain for each sign), and 2
@@ -204,12 +204,12 @@ def test_no_wrong_answer_in_silence(unseen, command, tmp_path):
     for chance.
     """
     answers = []
-    for number in range(int(unseen), 144, 2):
+    for number in range(int(unseen), 72, 2):
         folder = tmp_path / str(number)
         folder.mkdir()
         answers.append(hunt(Case(19, number, unseen), command, folder))
     (tmp_path / "answers.json").write_text(json.dumps(answers))
     report = tallies.report(answers, "pytest")
-    assert len(tallies.silent(answers)) <= (1 if unseen else 4), report
+    assert len(tallies.silent(answers)) <= (0 if unseen else 2), report
     healthy = sum(a["family"] == "healthy" for a in answers)
     assert len(tallies.false_warnings(answers)) <= 0.02 * healthy + 2, report

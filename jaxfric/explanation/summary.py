@@ -23,7 +23,7 @@ from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
-from .verdict import beside_rows, rough, stand_ins, verdict_of
+from .verdict import beside_rows, halved, rough, stand_ins, verdict_of
 from .wording import ELSEWHERE
 
 
@@ -66,7 +66,8 @@ def summarise(
     new, later = (
         [s for s in some if s.coordinate not in known.structured] for some in (before, after)
     )
-    much = (rough(filtered, shares) or beside_rows(errors)) and not known.rough
+    missing = rough(filtered, shares) or beside_rows(errors) or halved(refuted)
+    much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     return Explanation(

@@ -60,6 +60,14 @@ def beside_rows(fit: Mapping[str, Any]) -> bool:
     return fit["force_error"]["after"] ** 2 - fit["noise_floor"] ** 2 > LARGE**2
 
 
+def halved(refuted: Sequence[Finding]) -> bool:
+    """Whether what the held-out recording refutes halves the size of what the baseline leaves here.
+
+    Noise cannot be removed: then something is missing, though it has another name.
+    """
+    return any(finding.share > 1 - HALF**2 for finding in refuted)
+
+
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
 # what they account for, none can claim it: they stand in for one that the library does not have.
 STAND_INS = 3

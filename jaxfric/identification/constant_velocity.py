@@ -235,7 +235,8 @@ def _misshapen(model: Model, velocity, force, half) -> bool:
     To first order in the nonlinear ones. Of weighted least squares the residual varies less than
     the point itself, so that the interval is wide enough.
     """
-    if not model.term.coordinates <= {"velocity", "acceleration"}:
+    # Points without any scatter are of a force that was not measured.
+    if not model.term.coordinates <= {"velocity", "acceleration"} or not half.all():
         return False
     speeds = jnp.asarray(velocity)
     still = jnp.zeros_like(speeds)
