@@ -622,6 +622,7 @@ def test_values_that_do_not_carry_over_are_said_to(healthy):
         ("friction_step", 0.03, 0.01, False),  # it acts there too
         ("friction_step", 0.11, 0.09, False),  # noise
         ("cogging", 0.11, 0.01, False),
+        ("force_limit", 0.11, 0.01, False),  # which no term models
     ],
 )
 def test_what_acts_at_a_moment_says_nothing_of_the_held_out_recording(effect, held, noise, told):

@@ -138,7 +138,8 @@ MOST = 0.5
 
 def _of_a_moment(findings: Sequence[Finding], fit: Mapping[str, Any]) -> list[str]:
     """That what is tied to the time of this recording leaves the held-out one as it was."""
-    names = [f.effect.replace("_", " ") for f in findings if EFFECTS[f.effect].momentary]
+    moments = {name for name, effect in EFFECTS.items() if effect.momentary}
+    names = [f.effect.replace("_", " ") for f in findings if f.effect in moments]
     pairs = [fit.get("force_error"), fit.get("holdout_force_error")]
     if not names or any(pair is None for pair in pairs):
         return []
