@@ -13,7 +13,7 @@ from .improvement import Improved, errors_of_base, force_errors
 from .motion import Motion
 from .problem import with_holdout
 from .selection import Selection
-from .uncertainty import estimated
+from .uncertainty import by_rows
 
 
 def check_signals(selection: Selection, recording: Recording, holdout: Recording) -> None:
@@ -154,9 +154,13 @@ def _borne_out(findings: Findings, number: int) -> bool | None:
 
 
 def _nil_in_both(findings: Findings) -> list[bool]:
-    """Whether each finding's force may as well be none, by what both recordings say of it."""
+    """Whether each finding's force may as well be none by what either recording says of it, or a
+    kernel of twice the width.
+    """
     selection = findings.selection
     start = selection.term_index(0)
-    values = estimated(findings, shaped=True)[start:] if selection.selected else []
-    terms = selection.last.terms[start:]
-    return [spelled.may_be_none(*pair) for pair in zip(terms, values, strict=True)]
+    values = by_rows(findings, shaped=True)[start:] if selection.selected else []
+    return [
+        any(spelled.may_be_none(term, own.here, other) for other in (own.wide, own.there))
+        for term, own in zip(selection.last.terms[start:], values, strict=True)
+    ]

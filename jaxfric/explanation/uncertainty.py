@@ -1,6 +1,8 @@
 """Parameters of a model, with errors that contain what other rows of the machine say."""
 
 from collections.abc import Collection
+from itertools import zip_longest
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,11 +17,36 @@ from .regression import Fit, at_shapes, freed
 from .significance import evenly
 
 
-def estimated(
-    findings: Findings, moved: Collection[int] = (), shaped: bool = False
-) -> list[dict[str, Estimate]]:
+class Estimates(NamedTuple):
+    """The parameters of one term by three sets of rows, with each one's own errors.
+
+    `here`: those of the recording; `wide`: through a kernel of twice the width; `there`: those of
+    the held-out recording. `None` where there are none, or what they say is not to be compared.
+    """
+
+    here: dict[str, Estimate]
+    wide: dict[str, Estimate] | None = None
+    there: dict[str, Estimate] | None = None
+
+    def joined(self) -> dict[str, Estimate]:
+        """Those of the recording, with errors that contain what the others say."""
+        found = self.here
+        if self.wide is not None:
+            found = spelled.with_smoothing(found, self.wide)
+        return found if self.there is None else spelled.with_elsewhere(found, self.there)
+
+
+def estimated(findings: Findings, moved: Collection[int] = ()) -> list[dict[str, Estimate]]:
     """The parameters of each term; their errors contain what a wider kernel and the held-out
-    recording change.
+    recording change. `moved`: as [`by_rows`][] takes it.
+    """
+    return [each.joined() for each in by_rows(findings, moved)]
+
+
+def by_rows(
+    findings: Findings, moved: Collection[int] = (), shaped: bool = False
+) -> list[Estimates]:
+    """The parameters of each term by all rows that there are.
 
     Where the force acts late, all terms but the last, the delay or lag itself, are estimated with
     the force put back. `moved`: numbers of the base's values that were found wrong, if any; what
@@ -40,26 +67,24 @@ def estimated(
     ours = spelled.estimates(asked(selection.last), rows.block, units)
     delayed = traits(selection.last.terms[-1]).late
     problem, others = findings.undelayed if delayed else findings.recorded
+    count = len(others.last.terms)
     late = [
         {
             name: own._replace(standard_error=np.hypot(own.standard_error, selection.time_error))
             for name, own in term.items()
         }
-        for term in ours[len(others.last.terms) :]
+        for term in ours[count:]
     ]
-    both = ours[: len(others.last.terms)]
+    wide: list[dict[str, Estimate]] = []
     if problem.wide is not None:
         current, block = again(problem.wide, others.last)
         false = aliased(asked(others.last), problem.evidence.rows, current)
         wide = spelled.estimates(current, block, units, false)
-        both = [spelled.with_smoothing(*pair) for pair in zip(both, wide, strict=True)]
+    there: dict[int, dict[str, Estimate]] = {}
     if problem.held is not None:
         # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
         lasting = verification.lasting(others.last, others.rephased)
-        there = spelled.estimates(*again(problem.held, lasting), units)
-        own = {id(term): values for term, values in zip(lasting.terms, there, strict=True)}
-        both = [
-            spelled.with_elsewhere(mine, own.get(id(term), mine))
-            for term, mine in zip(others.last.terms, both, strict=True)
-        ]
-    return both + late
+        values = spelled.estimates(*again(problem.held, lasting), units)
+        there = {id(term): each for term, each in zip(lasting.terms, values, strict=True)}
+    both = zip_longest(ours[:count], wide, map(there.get, map(id, others.last.terms)))
+    return [Estimates(*each) for each in both] + [Estimates(each) for each in late]
