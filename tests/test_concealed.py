@@ -214,6 +214,15 @@ def test_most_effects_have_a_definition_that_is_only_scored_and_none_changes_sid
     assert half_of("actuator_saturation", "tanh") == half_of("stick", "smooth") == "development"
 
 
+def test_the_bristles_of_a_healthy_machine_are_stiffer_than_a_log_resolves():
+    machine = concealed.draw(391328099, definitions={"stick": "bristles"})
+    physics, plan = machine.physics, machine.plan
+    dry = max(physics[f"coulomb{s}"] + physics[f"bump{s}"] for s in "+-")
+    # Turned round by twice its dry friction.
+    passed = np.sqrt(physics["presliding_distance"] * physics["mass"] / dry)
+    assert passed <= 0.1 / plan.sample_rate and plan.substeps == 43
+
+
 def test_the_usual_definition_is_what_is_drawn_where_none_is_asked_for():
     plain = concealed.draw(5, ("cogging",))
     assert plain.truth["cogging"]["definition"] == "harmonics"

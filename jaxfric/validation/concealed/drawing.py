@@ -24,7 +24,7 @@ from .machines import (
 )
 from .nominal import Kind, nominal
 from .physics import ABSENT
-from .sticking import sticking
+from .sticking import fewest, sticking
 from .tuning import BURST, tune
 
 # How often a loop that bursts is made half as fast before it is given up.
@@ -55,7 +55,7 @@ def draw(
     effects, asked = tuple(effects), dict(definitions or {})
     kinds = _checked(effects, asked)
     rng = np.random.default_rng((seed, 0))
-    plan = draw_plan(rng, seed)
+    plan = draw_plan(rng, seed)._replace(fewest=fewest(asked.get(STICK, "")))
     time = np.arange(plan.samples) / plan.sample_rate
     x, v = reference(plan, seed, 0)
     coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))

@@ -18,7 +18,7 @@ class Plan(NamedTuple):
 
     `kinds`: of the identification's and the held-out motion; `sample_rate` Hz; `samples` of each;
     `periods` s, one way there and back of each motion; `low` and `stroke` m, what the set-point
-    visits.
+    visits; `fewest` integration steps a sample.
     """
 
     kinds: tuple[str, str]
@@ -27,6 +27,7 @@ class Plan(NamedTuple):
     periods: tuple[float, float]
     low: float
     stroke: float
+    fewest: int = 4
 
     @property
     def period(self) -> float:
@@ -36,7 +37,7 @@ class Plan(NamedTuple):
     @property
     def substeps(self) -> int:
         """Integration steps a sample."""
-        return max(4, int(np.ceil(SUBSTEP_RATE / self.sample_rate)))
+        return max(self.fewest, int(np.ceil(SUBSTEP_RATE / self.sample_rate)))
 
 
 class Noise(NamedTuple):
