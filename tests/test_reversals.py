@@ -96,6 +96,20 @@ def test_a_curve_between_updates_of_the_position_is_no_motion():
     assert reversals.yields(blind, posed.evidence, posed.base)
 
 
+@pytest.mark.parametrize(("share", "known"), [(0.3, False), (3.0, True)])
+def test_less_than_a_count_is_no_motion(share, known, monkeypatch):
+    """At rest the position follows the force by a share of a count, beside noise."""
+    x, direction, waited = path(0.0)
+    level = direction * (1 - 2 * waited)
+    rest = (waited > 0) & (waited < 1)
+    dither = 0.3 * np.random.default_rng(1).standard_normal(COUNT)
+    log = recorded(x + PITCH * (0.5 * share * level * rest + dither), LEVEL * level)
+    sure = []
+    monkeypatch.setattr(reversals, "_one_way", lambda slopes: sure.append(slopes) or True)
+    assert yields(log) is known
+    assert np.median(sure[0]) == pytest.approx(0.5 * share * PITCH, rel=0.5)
+
+
 @pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])
 def test_an_axis_that_creeps_over_is_told_from_one_that_yields(force_unit, unit):
     """Below the slowest speed that is told from rest it is no friction over a distance."""

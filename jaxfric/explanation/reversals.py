@@ -17,6 +17,7 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
+from ..signals import counted_noise
 from ..terms import Dahl
 from ..terms.base import AbstractLaw
 from ..terms.sample import UNKNOWN, Parameter
@@ -32,13 +33,17 @@ from .significance import DRAWS
 BETWEEN = 0.7
 # Samples of a reversal in that range, for a slope through them.
 LEAST_SAMPLES = 4
+# Rounding to counts is a noise of a count over this (Widrow 1956).
+COUNT = np.sqrt(12)
 
 
 def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool:
     """Whether the position follows the force while friction passes from one level to the other.
 
     In every reversal, the slope of position by force between the break-away levels of the base's
-    slip friction: at rest its sign is a coin's, and one that still comes to rest is negative.
+    slip friction: at rest its sign is a coin's, and one that still comes to rest is negative. An
+    axis that yields by less than a count in most of them has no direction there that a row could
+    know, however sure the mean of them all is.
 
     **Arguments:** `recording` with a position, `(N,)`, and its `evidence`; `base`, the fit of the
     baseline.
@@ -50,7 +55,9 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
     slopes = np.array(
         [_slope(level, position[at]) for at, level in passages(motion, evidence, base)]
     )
-    return bool(len(slopes)) and _one_way(slopes)
+    if not len(slopes) or not _one_way(slopes):
+        return False
+    return bool(2 * BETWEEN * np.median(slopes) > COUNT * counted_noise(position))
 
 
 class _Creep(AbstractLaw):
