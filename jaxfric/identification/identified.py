@@ -85,7 +85,7 @@ class Identified(eqx.Module):
 
     - `model`: the sum with its parameters, a [`Model`][jaxfric.models.Model].
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible. Outside of `jax.jit` it
-      holds what a force that acts up to two samples late makes of the parameters.
+      holds what a force that acts up to one and a half samples late makes of the parameters.
     - `result`: a member of [`Result`][].
     - `windows`, `covered`: how many windows were used and which share of the slip time they hold.
     - `filtered_force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia
