@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.identification import checking
 from jaxfric.identification.identified import result_names
 from jaxfric.simulation.prediction import force_error, relative_error
 
@@ -329,6 +330,15 @@ def test_rows_of_a_batch_are_aligned_each_by_itself():
     assert first == pytest.approx(0.5, abs=0.05) and abs(second) < 0.05
     alone = jf.identify("coulomb-viscous", logs[0], projection=jf.WeakForm(16), align=True)
     np.testing.assert_allclose(found.model.alpha[0], alone.model.alpha, rtol=1e-6)
+
+
+def test_a_late_force_does_not_shift_a_bump_that_closed_windows_know():
+    found = jf.identify("gaussian", held())
+    moving = dict(zip(found.names, checking._moving(found, len(found.names)), strict=True))
+    assert found.projection == "closed_windows"
+    assert [n for n, moves in moving.items() if moves] == list(HELD)
+    weak = jf.identify("gaussian", held(), projection=jf.WeakForm(16))
+    assert checking._moving(weak, len(weak.names)) is None
 
 
 def test_a_force_at_its_stamp_stays_there():

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .kinds import places
 
@@ -166,10 +166,13 @@ class Lateness(NamedTuple):
         return SURE * self.error < abs(self.time) <= STAMPED * interval
 
 
-def lateness(design: Design) -> Lateness | None:
+def lateness(design: Design, moving: Bool[np.ndarray, " P"] | None = None) -> Lateness | None:
     """The [`Lateness`][] that the rows of a fit show; `None` where they cannot.
 
     Of less than a row. What the parameters imitate of it is no part of the estimate.
+
+    **Arguments:** `moving`: the parameters that shift with it, where others are known from what
+    these rows do not hold.
     """
     rows = np.flatnonzero(np.asarray(design.weight) > 0)
     if len(rows) < PARTS:
@@ -189,6 +192,10 @@ def lateness(design: Design) -> Lateness | None:
         return None
     part = float(own @ left)
     late = -part / power
+    if moving is not None:
+        solved = np.linalg.lstsq((columns / size)[:, moving], slope, rcond=1e-10)[0]
+        taken = np.zeros(len(size))
+        taken[moving] = solved / size[moving]
     rest = own * (left + late * own)
     sums = np.add.reduceat(rest, np.arange(PARTS) * len(rows) // PARTS)
     return Lateness(late, float(np.sqrt(sums @ sums)) / power, -taken, part**2 / power, shape)
