@@ -110,6 +110,15 @@ def test_less_than_a_count_is_no_motion(share, known, monkeypatch):
     assert np.median(sure[0]) == pytest.approx(0.5 * share * PITCH, rel=0.5)
 
 
+def test_another_zero_in_each_part_of_a_log_is_no_noise():
+    log = yielding()
+    part = (np.arange(COUNT) >= COUNT // 2).astype(np.int32)
+    parts = dataclasses.replace(
+        log, position=log.position + 5.0 * part, segment=jnp.asarray(part), num_segments=2
+    )
+    assert yields(parts)
+
+
 @pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])
 def test_an_axis_that_creeps_over_is_told_from_one_that_yields(force_unit, unit):
     """Below the slowest speed that is told from rest it is no friction over a distance."""

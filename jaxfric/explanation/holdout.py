@@ -44,7 +44,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     moment need not recur, and are not tested.
     """
     findings = _rephased(_with_rows(better.findings, holdout))
-    nil = _nil_in_both(findings)
+    nil = _nil(findings)
     borne = [_borne_out(findings, number) for number in range(len(nil))]
     borne = [each and not none for each, none in zip(borne, nil, strict=True)]
     findings = findings.with_selected([
@@ -108,7 +108,7 @@ def _without_nil(better: Improved) -> Improved:
     """Without findings whose force may as well be none once the base has its own values."""
     findings = better.findings
     numbers = [n for n in range(len(better.claimed.selection.selected)) if n not in better.refuted]
-    gone = [n for n, none in enumerate(_nil_in_both(findings)) if none]
+    gone = [n for n, none in enumerate(_nil(findings)) if none]
     refuted = (*better.refuted, *(numbers[n] for n in gone))
     return _refuting(better, findings, gone)._replace(refuted=tuple(sorted(refuted)))
 
@@ -153,7 +153,7 @@ def _borne_out(findings: Findings, number: int) -> bool | None:
     return verification.nearer(with_it, without)
 
 
-def _nil_in_both(findings: Findings) -> list[bool]:
+def _nil(findings: Findings) -> list[bool]:
     """Whether each finding's force may as well be none by what either recording says of it, or a
     kernel of twice the width.
     """

@@ -73,21 +73,22 @@ def tested(estimate: Estimate) -> Estimate:
 
 
 def may_be_none(
-    term: AbstractTerm, own: dict[str, Estimate], wide: dict[str, Estimate] | None = None
+    term: AbstractTerm, own: dict[str, Estimate], other: dict[str, Estimate] | None = None
 ) -> bool:
     """Whether of all that its force is proportional to, of waves of the amplitudes too, there is no
     interval that leaves out zero.
 
-    `wide`: the same through a kernel of twice the width, which has to agree with it, as one that
-    sees little of it does, or to leave out zero on the same side.
+    `other`: the same by other rows, of another recording or through a kernel of twice the width,
+    which have to agree with it, as those that see little of it do, or to leave out zero on the same
+    side.
     """
 
     def sure(name: str) -> bool:
         low, high = tested(own[name]).interval()
-        if low * high <= 0 or wide is None:
+        if low * high <= 0 or other is None:
             return bool(low * high > 0)
-        least, most = tested(wide[name]).interval()
-        apart = float(own[name].value) - float(wide[name].value)
+        least, most = tested(other[name]).interval()
+        apart = float(own[name].value) - float(other[name].value)
         return bool(
             abs(apart) <= np.hypot(high - low, most - least) / 2
             or (least > 0 if low > 0 else most < 0)

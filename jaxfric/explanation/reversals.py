@@ -17,7 +17,7 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
-from ..signals import counted_noise
+from ..signals.sampled import SampledSignal
 from ..terms import Dahl
 from ..terms.base import AbstractLaw
 from ..terms.sample import UNKNOWN, Parameter
@@ -57,7 +57,8 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
     )
     if not len(slopes) or not _one_way(slopes):
         return False
-    return bool(2 * BETWEEN * np.median(slopes) > COUNT * counted_noise(position))
+    count = COUNT * SampledSignal.of(motion.recording, position).noise()
+    return bool(2 * BETWEEN * np.median(slopes) > count)
 
 
 class _Creep(AbstractLaw):

@@ -137,7 +137,7 @@ MOST = 0.5
 
 
 def _of_a_moment(findings: Sequence[Finding], fit: Mapping[str, Any]) -> list[str]:
-    """That what is tied to the time of this recording leaves the held-out one as it was."""
+    """That what need not recur leaves most of the held-out recording's error as it was."""
     moments = {name for name, effect in EFFECTS.items() if effect.momentary}
     names = [f.effect.replace("_", " ") for f in findings if f.effect in moments]
     pairs = [fit.get("force_error"), fit.get("holdout_force_error")]
@@ -148,8 +148,8 @@ def _of_a_moment(findings: Sequence[Finding], fit: Mapping[str, Any]) -> list[st
     if here > MOST or held < MOST or noise:
         return []
     return [
-        f"But {' and '.join(names)} acted at a time of this recording and says nothing of the "
-        f"held-out one, where {pairs[1]['after']:.2%} is left: explain that one by itself."
+        f"But {' and '.join(names)} need not recur, and most of what the held-out recording shows "
+        f"is left, {pairs[1]['after']:.2%}: explain that one by itself."
     ]
 
 

@@ -33,8 +33,8 @@ def faults(recording: Recording, given: int | None = None) -> np.ndarray:
 def checked(
     found: Identified, design: Design, recording: Recording, faults: np.ndarray
 ) -> Identified:
-    """What was identified with its warnings, and with the error that a force late by less than two
-    samples makes in its covariance; a severe warning makes a row contradictory.
+    """What was identified with its warnings, and with the error that a late force makes in its
+    covariance; a severe warning makes a row contradictory.
 
     `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
     """
@@ -48,12 +48,12 @@ def checked(
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     delayed = found.model.force_delay is not None
+    moving = _moving(found, design.columns.shape[-1])
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
         row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
         own, log = row
-        late = checks.lateness(own, _moving(found, own.columns.shape[1]))
-        interval = signals.host_interval(log)
+        late, interval = checks.lateness(own, moving), signals.host_interval(log)
         fit = checks.Estimated(alpha, half, interval, late)
         fitted = checks.fitted(own, float(error), fit)
         if late is not None:
@@ -90,7 +90,8 @@ def _moving(found: Identified, count: int) -> np.ndarray | None:
         for leaf in summands(found.model.term)
         for number in range(len(leaf.affine))
     ]
-    return np.pad(plain, (0, max(0, count - len(plain))))[:count]
+    known = np.pad(plain, (0, max(0, count - len(plain))))[:count]
+    return None if known.all() else known
 
 
 def _by_lateness(late: checks.Lateness, interval: float, delayed: bool, count: int) -> np.ndarray:

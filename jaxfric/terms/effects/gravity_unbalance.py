@@ -29,7 +29,7 @@ def _long_bounds(scales):
     return stroke(scales) / REPEATED, 8 * stroke(scales)
 
 
-# Less than a cycle: what is told apart are the curvatures of its pieces, not their phases.
+# Hardly more than a cycle: what is told apart are the curvatures of its pieces, not their phases.
 _LONG = Resolution(-1, 16, stroke, 16)
 
 

@@ -18,7 +18,7 @@ class Plan(NamedTuple):
 
     `kinds`: of the identification's and the held-out motion; `sample_rate` Hz; `samples` of each;
     `periods` s, one way there and back of each motion; `low` and `stroke` m, what the set-point
-    visits; `fewest` integration steps a sample.
+    visits; `fewest` integration steps a sample, if more than usual.
     """
 
     kinds: tuple[str, str]
@@ -27,7 +27,7 @@ class Plan(NamedTuple):
     periods: tuple[float, float]
     low: float
     stroke: float
-    fewest: int = 4
+    fewest: int = 1
 
     @property
     def period(self) -> float:
@@ -37,7 +37,7 @@ class Plan(NamedTuple):
     @property
     def substeps(self) -> int:
         """Integration steps a sample."""
-        return max(self.fewest, int(np.ceil(SUBSTEP_RATE / self.sample_rate)))
+        return max(4, self.fewest, int(np.ceil(SUBSTEP_RATE / self.sample_rate)))
 
 
 class Noise(NamedTuple):

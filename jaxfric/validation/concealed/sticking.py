@@ -13,7 +13,7 @@ _STIFF = 43
 
 def fewest(name: str) -> int:
     """Integration steps a sample that a definition of `stick` takes at least."""
-    return _STIFF if name == "bristles" else 4
+    return _STIFF if name == "bristles" else 1
 
 
 def sticking(name: str, n: Nominal) -> dict[str, float]:
