@@ -134,6 +134,8 @@ def test_without_bristles_none_are_found():
     # None, or a distance below what the encoder counts.
     assert test.stiffness is None and test.why or test.distance < 2e-6
     assert test.kind == "jump"
+    none = repr(test).startswith("No bristles identified: ")
+    assert none == (test.stiffness is None)
 
 
 @pytest.mark.slow

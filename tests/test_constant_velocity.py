@@ -49,6 +49,9 @@ def test_points_are_the_friction_at_the_speeds_held():
         assert point.high - point.low < 0.3
         assert np.isnan(point.curve) and not point.contradicts
     assert all(abs(g.low) < 0.02 or abs(g.high) < 0.08 for g in test.not_evaluated)
+    lines = repr(test).splitlines()
+    assert lines[0].split()[:2] == ["velocity", "force"] and lines[1].split()[0].startswith("-0.1")
+    assert sum(line.startswith("not evaluated ") for line in lines) == len(test.not_evaluated)
 
 
 def test_a_dead_sensor_contradicts_no_curve():

@@ -237,7 +237,7 @@ PITCHES = {
 
 
 @pytest.mark.slow
-@settings(max_examples=15)
+@settings(max_examples=8)
 @given(**PITCHES)
 def test_any_pitch_is_found_from_the_default_bounds(turns, phase, seed):
     pitch_again(turns, phase, seed)

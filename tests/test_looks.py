@@ -454,14 +454,3 @@ def test_to_pandas_has_a_row_for_each_parameter(fit, batch, monkeypatch):
 def test_to_pandas_is_a_data_frame(fit):
     pandas = pytest.importorskip("pandas")
     assert isinstance(fit.to_pandas(), pandas.DataFrame)
-
-
-@pytest.mark.slow
-def test_points_of_constant_velocity_and_bristles_print_as_text():
-    recording = jf.scenario.record(jf.scenario.machine(), force_noise=0.5, key=jax.random.key(0))
-    found = jf.identify("lorentzian", recording)
-    points = repr(jf.constant_velocity(recording, found)).splitlines()
-    assert points[0].split()[:2] == ["velocity", "force"] and points[5].startswith(
-        "not evaluated -0.1"
-    )
-    assert repr(jf.presliding(recording, found)).startswith("No bristles identified: ")
