@@ -442,7 +442,10 @@ def tones_judged(seed, rows, tone):
     turned = 2 * np.pi * np.linspace(1.5, 70, 300)[:, None] * at
     waves = np.stack([np.sin(turned), np.cos(turned)], axis=1).astype(np.float32)
     fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
-    scan = significance.BlockBootstrap(fit, block)(waves)
+    return gain_and_hurdle(significance.BlockBootstrap(fit, block)(waves))
+
+
+def gain_and_hurdle(scan):
     return scan.gain[scan.best], significance.thresholds(scan.drawn[None], significance.LEVEL)[0]
 
 
@@ -461,9 +464,26 @@ def test_what_a_place_beside_the_right_one_leaves_is_no_noise():
     basis = np.linalg.qr(np.stack([np.ones(1450), np.sign(np.gradient(at))], axis=1))[0]
     fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
     cubes = ((at - np.linspace(-0.3, 0.3, 8)[:, None]) ** 3)[:, None].astype(np.float32)
-    scan = significance.BlockBootstrap(fit, block)(cubes)
-    hurdle = significance.thresholds(scan.drawn[None], significance.LEVEL)[0]
-    assert 0.9 < scan.gain[scan.best] and hurdle < 0.1  # by what it leaves, 0.22
+    gain, hurdle = gain_and_hurdle(significance.BlockBootstrap(fit, block)(cubes))
+    assert gain > 0.9 and hurdle < 0.1  # by what it leaves, 0.22
+
+
+@pytest.mark.parametrize("strokes", [4, 1])
+def test_beside_structure_a_wave_does_not_raise_its_own_hurdle(strokes):
+    """Seen where the axis is slow, once a stroke, its flips are a wave nearby; once is nothing."""
+    draw, at = np.random.default_rng(0), np.linspace(0, 1, 650)
+    slow = np.exp(-0.5 * ((np.mod(at, 0.25) - 0.125) / 0.012) ** 2)
+    wave = 4 / strokes**0.5 * slow * (at < strokes / 4) * np.sin(2 * np.pi * 38.6 * at + 1)
+    residual = wave + 8 * (at - at**2) + 0.2 * draw.normal(size=650)
+    basis = np.linalg.qr(np.stack([np.ones(650), at**2], axis=1))[0]
+    turned = 2 * np.pi * np.linspace(20, 60, 321)[:, None] * at
+    waves = (np.stack([np.sin(turned), np.cos(turned)], axis=1) * slow).astype(np.float32)
+    fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
+    bootstrap = significance.BlockBootstrap(fit, significance.evenly(650, 24))
+    scan = bootstrap(waves)
+    gain, before = gain_and_hurdle(scan)
+    _, after = gain_and_hurdle(bootstrap.beside_structure(scan, waves))
+    assert gain < before and (after < gain / 2 if strokes > 1 else after == before)
 
 
 @pytest.mark.slow
@@ -1433,6 +1453,18 @@ def test_terms_that_share_what_they_remove_stand_in_for_another():
 def test_what_halves_the_residual_is_no_chance_though_another_recording_refutes_it():
     assert verdict.halved([types.SimpleNamespace(share=0.8)])
     assert not verdict.halved([types.SimpleNamespace(share=0.4)] * 2) and not verdict.halved([])
+
+
+@pytest.mark.parametrize(
+    ("error", "noise", "missing"),
+    [(0.26, 0.10, True), (0.11, 0.10, False), (0.04, 0.002, False), (0.6, 0.5, True)],
+)
+def test_what_is_left_sample_by_sample_and_is_no_noise_is_not_nothing(error, noise, missing):
+    """Blows of a load in its gap; noise; what sampling leaves of the acceleration; standstill."""
+    fit = {"force_error": {"before": error, "after": error}, "noise_floor": noise}
+    assert verdict.beside_rows(fit) == missing
+    said = wording._errors(fit | {"filtered_force_error": {"before": 0.03, "after": 0.03}}, False)
+    assert ("short events" in said) == (missing and noise**2 < error**2 / 2)
 
 
 @pytest.mark.parametrize(

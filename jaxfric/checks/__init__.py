@@ -1,6 +1,7 @@
 """What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
 
 from .fitted import (
+    LEFT as LEFT,
     MATTERS as MATTERS,
     Design as Design,
     Estimated as Estimated,

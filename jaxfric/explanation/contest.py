@@ -110,10 +110,19 @@ def contest(
     def scanned(candidate: Candidate) -> Scan:
         return bootstrap(field.columns(candidate, seen), candidate.effect.positive)
 
+    def again(numbered: tuple[Candidate, Scan, float]) -> Scan:
+        candidate, scan, p_value = numbered
+        if p_value <= LEVEL:
+            return scan
+        columns = field.columns(candidate, seen)
+        return bootstrap.beside_structure(scan, columns, candidate.effect.positive)
+
     scans = each(scanned, field.candidates)
-    drawn = np.array([s.drawn for s in scans])
-    p_values = adjusted(np.array([s.gain[s.best] for s in scans]), drawn)
-    least = thresholds(drawn, LEVEL)
+    p_values = _p_values(scans)
+    if np.min(p_values) <= LEVEL:  # the residual is no noise
+        scans = each(again, zip(field.candidates, scans, p_values, strict=True))
+        p_values = _p_values(scans)
+    least = thresholds(np.array([s.drawn for s in scans]), LEVEL)
     trials = [
         _trial(candidate, scan, float(p), float(limit))
         for candidate, scan, p, limit in zip(field.candidates, scans, p_values, least, strict=True)
@@ -135,6 +144,11 @@ def contest(
     within_reach = any(gain >= needed(t.candidate) for t, gain in zip(eligible, most, strict=True))
     finalists = _finals(seen, current, eligible, size, within_reach)
     return Contest(trials, finalists, size)
+
+
+def _p_values(scans: list[Scan]) -> np.ndarray:
+    """p-values of the best group of each scan, corrected for all of them, `(C,)`."""
+    return adjusted(np.array([s.gain[s.best] for s in scans]), np.array([s.drawn for s in scans]))
 
 
 def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Trial:

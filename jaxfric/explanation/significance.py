@@ -27,8 +27,7 @@ DRAWS = 499
 # tenth of the force it would have to be five times the force.
 NEW = 0.02
 # A group that removes half of the residual would, its signs flipped, do nearly as well at the next
-# grid point: a tone that begins anew has a frequency close by. Then the remainder is flipped,
-# scaled to the power of the whole residual.
+# grid point: a tone that begins anew has a frequency close by. Then the remainder is flipped.
 MOSTLY = 0.5
 # Columns that are tested together: they fill the cache and no more.
 CHUNK = 64
@@ -75,6 +74,23 @@ class BlockBootstrap:
         scan = self._scan(raw, self.residual, positive)
         if len(raw) == 1 or scan.gain[scan.best] < MOSTLY:
             return scan
+        return self._by_remainder(scan, raw, positive)
+
+    def beside_structure(self, scan: Scan, raw: np.ndarray, positive: bool = False) -> Scan:
+        """The scan of groups in a residual that is known to hold structure.
+
+        If that is the best group's, the flipped residual is no noise for the others either. So its
+        remainder is flipped, unless that group's own draws do as well: what happens once, the signs
+        leave as it is.
+        """
+        if len(raw) == 1 or scan.gain[scan.best] >= MOSTLY:
+            return scan
+        alone = self._scan(raw[scan.best : scan.best + 1], self.residual, positive)
+        chance = np.mean(alone.drawn >= alone.gain[0])
+        return scan if chance > LEVEL else self._by_remainder(scan, raw, positive)
+
+    def _by_remainder(self, scan: Scan, raw: np.ndarray, positive: bool) -> Scan:
+        """With draws of what the best group leaves, scaled to the power of the whole residual."""
         own = self.new_columns(raw[scan.best : scan.best + 1])[0][0]
         left = self.residual - (own @ self.residual) @ own
         left /= np.linalg.norm(left)

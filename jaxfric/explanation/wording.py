@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..checks import LEFT
 from ..terms.effects import EFFECTS
 from .finding import Finding
 
@@ -80,16 +81,18 @@ LARGE = 0.3
 
 
 def _by_sample(fit: Mapping[str, Any]) -> str:
-    """What most of a large error is that no filter leaves: noise, or friction beside standstill."""
+    """What most of a large error is that no filter leaves: noise, or short events."""
     if "filtered_force_error" not in fit:
         return ""
     whole, filtered = fit["force_error"]["after"], fit["filtered_force_error"]["after"]
-    if not whole > LARGE or filtered > 0.5 * whole:
+    floor = fit.get("noise_floor")
+    noisy = floor is not None and floor**2 > 0.5 * whole**2
+    if not whole > (LARGE if noisy else LEFT) or filtered > 0.5 * whole:
         return ""
-    if (floor := fit.get("noise_floor")) is not None and floor**2 > 0.5 * whole**2:
+    if noisy:
         what = "the noise of the acceleration"
     else:
-        what = "left beside standstill and reversals, for which the values are no good"
+        what = "left in short events, as beside reversals, for which the values are no good"
     return f" Sample by sample most of it is {what}: {filtered:.2%} is left through a filter."
 
 
