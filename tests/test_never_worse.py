@@ -383,3 +383,45 @@ def test_what_is_larger_by_chance_alone_is_not_worse(larger, agree, worse):
     # Of a figure without parts nothing is known but itself.
     alone = [each._replace(parts={}) for each in errors]
     assert alone[1].worse(alone[0], 1e-8) == ["here"]
+
+
+class Reported:
+    """Findings by name: the rows' energy, and the force error, of a model with them."""
+
+    ENERGY = {"": 9.0, "a": 3.0, "b": 8.0, "ab": 1.0, "abc": 0.9, "ac": 2.9, "bc": 7.9, "c": 8.8}
+
+    def __init__(self, names, wrong):
+        self.names, self.wrong = names, wrong
+        each = [types.SimpleNamespace(effect=types.SimpleNamespace(name=n)) for n in names]
+        self.selection = types.SimpleNamespace(given=None, selected=each, base=None)
+        last = types.SimpleNamespace(energy=self.ENERGY["".join(sorted(names))])
+        self.undelayed = types.SimpleNamespace(selection=types.SimpleNamespace(last=last))
+
+    def without(self, number):
+        return Reported(self.names[:number] + self.names[number + 1 :], self.wrong)
+
+    def at_base(self, first):
+        return Reported("", self.wrong)
+
+    def error(self):
+        """Each that is wrong adds to an error that is mostly noise, and the best one some more."""
+        return 0.12 + 0.003 * sum(n in self.names for n in self.wrong) + 0.004 * ("a" in self.names)
+
+
+@pytest.mark.parametrize(("wrong", "left"), [("c", "ab"), ("b", "ac"), ("bc", "b"), ("", "abc")])
+def test_what_goes_is_what_makes_the_model_worse_and_not_what_explains_most(
+    monkeypatch, wrong, left
+):
+    def errors(some, figures, delay=None):
+        return improvement.Errors(some.error(), None, 0.1, None)
+
+    def base(start, some, figures):
+        return improvement.Errors(0.125, None, 0.1, None)
+
+    monkeypatch.setattr(improvement, "force_errors", errors)
+    monkeypatch.setattr(improvement, "errors_of_base", base)
+    monkeypatch.setattr(improvement, "LEAST_SHARE", 0.0)
+    monkeypatch.setattr(improvement, "_here", lambda some, figures: some.error())
+    figures = types.SimpleNamespace(rounding=1e-8)
+    found = improvement.improved(None, Reported("abc", wrong), figures)
+    assert found.findings.names == left and set(found.dropped) == set("abc") - set(left)

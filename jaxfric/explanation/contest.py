@@ -110,16 +110,18 @@ def contest(
     def scanned(candidate: Candidate) -> Scan:
         return bootstrap(field.columns(candidate, seen), candidate.effect.positive)
 
+    scans = each(scanned, field.candidates)
+    p_values = _p_values(scans)
+    known = [s.gain[s.best] for s, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
+
     def again(numbered: tuple[Candidate, Scan, float]) -> Scan:
         candidate, scan, p_value = numbered
-        if p_value <= LEVEL:
+        if p_value <= LEVEL or scan.gain[scan.best] <= max(known):
             return scan
         columns = field.columns(candidate, seen)
         return bootstrap.beside_structure(scan, columns, candidate.effect.positive)
 
-    scans = each(scanned, field.candidates)
-    p_values = _p_values(scans)
-    if np.min(p_values) <= LEVEL:  # the residual is no noise
+    if known:  # the residual is no noise
         scans = each(again, zip(field.candidates, scans, p_values, strict=True))
         p_values = _p_values(scans)
     least = thresholds(np.array([s.drawn for s in scans]), LEVEL)

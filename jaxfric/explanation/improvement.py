@@ -77,7 +77,8 @@ class Improved(NamedTuple):
 def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
     """The findings, without those that make the saved model worse than the baseline `first`.
 
-    By either figure, over the same samples. The one goes without which the force error is least.
+    By either figure, over the same samples. Of those without which it is not, the one goes that the
+    rows miss least; where there is none, the one without which the force error is least.
     """
     if findings.selection.given is not None:
         # Beside values as given, what only refitted values had called for removes nothing.
@@ -86,11 +87,15 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
     claimed, base = findings, findings.at_base(first)
     refitted = first is not findings.selection.base
     spoilt = None
+
+    def worse(some: Findings, after: Errors) -> bool:
+        return bool(after.worse(errors_of_base(base, some, figures), figures.rounding))
+
     while True:
         before = errors_of_base(base, findings, figures)
         selected = findings.selection.selected
         after = before if not (selected or refitted) else force_errors(findings, figures)
-        if not after.worse(before, figures.rounding):
+        if not worse(findings, after):
             less = None if spoilt is None else _without_idle(findings)
             if less is None:
                 break
@@ -100,8 +105,12 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
         if not selected:
             findings, refitted = base, False
             continue
-        fewer = (findings.without(n) for n in range(len(selected)))
-        findings = min(fewer, key=lambda some: _here(some, figures))
+        fewer = [findings.without(n) for n in range(len(selected))]
+        enough = [some for some in fewer if not worse(some, force_errors(some, figures))]
+        if enough:
+            findings = min(enough, key=lambda some: some.undelayed.selection.last.energy)
+        else:
+            findings = min(fewer, key=lambda some: _here(some, figures))
     dropped = _dropped(claimed, findings)
     if spoilt is not None and not dropped:
         dropped = (MISMATCH,)
