@@ -713,19 +713,35 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
     assert not named(planted(alone, terms.PeriodicDisturbance(), (1.0, 1.5), (rates[4],)))
 
 
+def fast_tones(posed, current):
+    return spectral_lines.fast_tone(predictions.with_predictions(posed.evidence, current), current)
+
+
 def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeypatch):
     structure = models.named("gaussian")
     run = planted(healthy[0], terms.PeriodicDisturbance(), (0.3, 0.4), (31.37,))
     posed = problem.problem_of(run, structure)
     monkeypatch.setattr(spectral_lines, "line_frequencies", lambda *_: np.array([5.0, 20.0]))
-    found = spectral_lines.fast_tone(posed.evidence, posed.base)
+    found = fast_tones(posed, posed.base)
     assert np.min(np.abs(found - 31.37)) < 0.02 and np.ptp(found) < 0.1
     # Noise has none, and what a fit leaves of a tone that it knows has none at that place.
     quiet = problem.problem_of(healthy[0], structure)
-    assert not len(spectral_lines.fast_tone(quiet.evidence, quiet.base))
+    assert not len(fast_tones(quiet, quiet.base))
     known = (terms.PeriodicDisturbance(), np.array([31.37]))
     both = regression.fit([structure, known[0]], posed.evidence, [posed.base.betas[0], known[1]], 2)
-    assert not len(spectral_lines.fast_tone(posed.evidence, both))
+    assert not len(fast_tones(posed, both))
+
+
+@pytest.mark.parametrize("beyond", [0.98, 1.0005, 1.02])
+def test_a_tone_beyond_what_rows_tell_is_not_taken_for_one_as_much_below(healthy, beyond):
+    """Rows are half a kernel apart: one period in that half is as fast as they tell."""
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    tone = beyond / posed.evidence.reach
+    run = planted(healthy[0], terms.PeriodicDisturbance(), (4.0, 3.0), (tone,))
+    posed = problem.problem_of(run, models.named("gaussian"))
+    found = fast_tones(posed, posed.base)
+    assert np.min(np.abs(found - tone)) < 0.02
+    assert np.all((found > 1 / posed.evidence.reach) == (beyond > 1))
 
 
 def test_a_refinement_beside_a_large_residual_ends_at_the_least_energy(healthy, monkeypatch):

@@ -161,8 +161,8 @@ def shared(tones: np.ndarray, evidence: Evidence) -> np.ndarray:
 def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     """Frequencies about the strongest tone above those scanned for, Hz; none if none stands out.
 
-    By the residual's spectrum, up to where it has a period in the kernel's half: beyond, rows
-    cannot tell it from a slower one.
+    By the residual's spectrum, up to where it has a period in the kernel's half. A tone beyond
+    looks in the rows like one as much below; the nodes, three times as many, tell.
     """
     scanned, top = line_frequencies(evidence, "time")[-1], 1 / evidence.reach
     if not evidence.clock or scanned >= top:
@@ -187,4 +187,15 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     tone = tones[best]
     if np.exp(-ratio[best]) * len(ratio) > LEVEL or shared(np.array([tone]), evidence)[0] >= OWN:
         return _NONE
-    return tone + (tones[1] - tones[0]) * np.arange(-2, 3)
+    steps = (tones[1] - tones[0]) * np.arange(-2, 3)
+    found = max([*(tone + steps), *(2 * top - tone + steps)], key=lambda f: _at_nodes(f, evidence))
+    return found + steps[(found + steps > top) == (found > top)]
+
+
+def _at_nodes(tone: float, evidence: Evidence) -> float:
+    """The power, N², of what a fit predicts too little at the rows' nodes, at a frequency, Hz."""
+    motion, rows = evidence.motion, (evidence.centre[:, None] + np.arange(-1, 2)).ravel()
+    force, said = np.asarray(motion.force), np.asarray(motion.channels["predicted_force"])
+    left = (force - said)[rows]
+    turned = 2 * np.pi * tone * np.asarray(motion.time)[rows]
+    return float(np.abs((left - left.mean()) @ np.exp(1j * turned)) ** 2)
