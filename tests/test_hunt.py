@@ -209,6 +209,6 @@ def test_no_wrong_answer_in_silence(unseen, command, tmp_path):
         answers.append(hunt(Case(19, number, unseen), command, folder))
     (tmp_path / "answers.json").write_text(json.dumps(answers))
     report = tallies.report(answers, "pytest")
-    assert len(tallies.silent(answers)) <= (0 if unseen else 2), report
+    assert len(tallies.silent(answers)) <= (0 if unseen else 1), report
     healthy = sum(a["family"] == "healthy" for a in answers)
-    assert len(tallies.false_warnings(answers)) <= 0.02 * healthy + 2, report
+    assert len(tallies.false_warnings(answers)) <= 0.02 * healthy + 1, report

@@ -88,14 +88,18 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
     refitted = first is not findings.selection.base
     spoilt = None
 
-    def worse(some: Findings, after: Errors) -> bool:
-        return bool(after.worse(errors_of_base(base, some, figures), figures.rounding))
+    def compared(some: Findings) -> tuple[Errors, Errors]:
+        before = errors_of_base(base, some, figures)
+        alike = not (some.selection.selected or refitted)
+        return before, before if alike else force_errors(some, figures)
+
+    def worse(before: Errors, after: Errors) -> bool:
+        return bool(after.worse(before, figures.rounding))
 
     while True:
-        before = errors_of_base(base, findings, figures)
+        before, after = compared(findings)
         selected = findings.selection.selected
-        after = before if not (selected or refitted) else force_errors(findings, figures)
-        if not worse(findings, after):
+        if not worse(before, after):
             less = None if spoilt is None else _without_idle(findings)
             if less is None:
                 break
@@ -106,7 +110,7 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
             findings, refitted = base, False
             continue
         fewer = [findings.without(n) for n in range(len(selected))]
-        enough = [some for some in fewer if not worse(some, force_errors(some, figures))]
+        enough = [some for some in fewer if not worse(*compared(some))]
         if enough:
             findings = min(enough, key=lambda some: some.undelayed.selection.last.energy)
         else:

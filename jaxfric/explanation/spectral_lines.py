@@ -162,7 +162,8 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     """Frequencies about the strongest tone above those scanned for, Hz; none if none stands out.
 
     By the residual's spectrum, up to where it has a period in the kernel's half. A tone beyond
-    looks in the rows like one as much below; the nodes, three times as many, tell.
+    looks in the rows like one as much below; the nodes, three times as many, tell. `evidence` with
+    the predictions of the fit.
     """
     scanned, top = line_frequencies(evidence, "time")[-1], 1 / evidence.reach
     if not evidence.clock or scanned >= top:
@@ -194,8 +195,8 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
 
 def _at_nodes(tone: float, evidence: Evidence) -> float:
     """The power, N², of what a fit predicts too little at the rows' nodes, at a frequency, Hz."""
-    motion, rows = evidence.motion, (evidence.centre[:, None] + np.arange(-1, 2)).ravel()
-    force, said = np.asarray(motion.force), np.asarray(motion.channels["predicted_force"])
-    left = (force - said)[rows]
-    turned = 2 * np.pi * tone * np.asarray(motion.time)[rows]
+    motion, near = evidence.motion, (evidence.centre[:, None] + np.arange(-1, 2)).ravel()
+    force, predicted = np.asarray(motion.force), np.asarray(motion.channels["predicted_force"])
+    left = (force - predicted)[near]
+    turned = 2 * np.pi * tone * np.asarray(motion.time)[near]
     return float(np.abs((left - left.mean()) @ np.exp(1j * turned)) ** 2)
