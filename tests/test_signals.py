@@ -271,6 +271,57 @@ def test_prepare_keeps_a_recorded_velocity_and_derives_a_missing_one():
     np.testing.assert_array_equal(signals.prepare(own).velocity, time)
 
 
+def filtered(time, velocity, constant):
+    """Through a first-order filter, as drives have it, exactly for straight lines in between."""
+    step = time[1] - time[0]
+    keep, out = np.exp(-step / constant), np.array(velocity)
+    for i in range(1, len(time)):
+        rise = (velocity[i] - velocity[i - 1]) / step
+        target = velocity[i - 1] - rise * constant
+        out[i] = target + rise * step + (out[i - 1] - target) * keep
+    return out
+
+
+@settings(max_examples=15)
+@given(
+    st.sampled_from([200.0, 1000.0, 4000.0]),
+    st.floats(0.7, 6.0),
+    st.floats(-6, 3),
+    st.integers(0, 10**6),
+)
+def test_a_velocity_that_a_filter_makes_late_gives_way_to_the_position(rate, late, unit, seed):
+    rng = np.random.default_rng(seed)
+    time, unit = np.arange(4000) / rate, 10.0**unit
+    position, velocity = multisine(rate / 200, time[-1], rng)
+    place, speed = position(time), velocity(time)
+    place = unit * (place + 1e-5 * np.std(place) * rng.standard_normal(len(time)))
+    noise = 3e-3 * np.std(speed) * rng.standard_normal(len(time))
+    own = filtered(time, unit * speed, late / rate) + unit * noise
+    record = log(time, place, velocity=own)
+    assert signals.lag_of_velocity(record) * rate == pytest.approx(late, rel=0.1)
+    found = np.asarray(signals.prepare(record).velocity) - unit * speed
+    assert np.std(found) < 0.5 * np.std(own - unit * speed)
+
+
+def test_a_velocity_is_kept_that_is_not_late_or_that_the_position_cannot_judge():
+    rng = np.random.default_rng(3)
+    time = np.arange(4000) / 1000
+    position, velocity = multisine(5.0, time[-1], rng)
+    place, speed = position(time), velocity(time)
+    noise = 3e-3 * np.std(speed) * rng.standard_normal(len(time))
+    quotient = np.diff(place, prepend=place[0] - 1e-3 * speed[0]) / 1e-3
+    late = filtered(time, speed, 3e-3)
+    coarse = np.round(place / np.ptp(place) * 12) * np.ptp(place) / 12
+    early = np.append(speed[4:], [speed[-1]] * 4)
+    for where, own in [
+        (place, speed + noise), (place, quotient + noise), (place, early), (coarse, late),
+        (place, -late), (place, 2 * late), (np.roll(place, 1300), late),
+    ]:  # fmt: skip
+        record = log(time, where, velocity=own)
+        assert signals.lag_of_velocity(record) == 0
+        np.testing.assert_array_equal(signals.prepare(record).velocity, own)
+
+
 @pytest.mark.parametrize("speed", [0.013, 0.2, -0.4])
 def test_counter_velocity_is_exact_at_constant_speed(speed):
     """The M/T method measures pulses against their own clock, so counts do not quantise it."""

@@ -61,6 +61,13 @@ KINDS = (
     Kind(
         "velocity_late",
         False,
+        "The velocity column is {value:.3g} s late beside the position, as a filter makes it, so "
+        "that friction would change its sign at the wrong time. The position's derivative is taken "
+        "in its place.",
+    ),
+    Kind(
+        "velocity_shifted",
+        False,
         "The velocity column is {value:.3g} s late beside the position (early, if negative), so "
         "that friction changes its sign at the wrong time. Leave it out: --columns velocity= .",
     ),

@@ -10,8 +10,6 @@ from .lone import CYCLE, LONE, PIECE, SPAN, lone
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
 # small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
 UNCERTAIN = 0.01 / 2**0.5
-# The position's increments that a velocity is compared with are this many times their noise.
-ABOVE_NOISE = 30.0
 # Two columns with less than half of their power in common are not the same motion.
 UNRELATED = 0.5
 # A drive's own filter and scaling leave a recorded velocity within a few hundredths; by a quarter
@@ -115,7 +113,7 @@ def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str,
 
 def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     """The recorded velocity's integral beside the position's increments, over the same spans."""
-    moved, driven = _increments(recording, clock)
+    moved, driven = signals.Increments.of(recording)[:2]
     if len(moved) < 32 or not (np.any(moved) and np.any(driven)):
         return {}
     shared, lag = _correlation(moved, driven)
@@ -125,8 +123,11 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     if shared < 0:
         return {"velocity_sign": shared}
     found = {}
-    if shared**2 - at_once**2 > LATE and abs(lag) > 1:
-        found["velocity_late"] = lag * clock.interval
+    apart = shared**2 - at_once**2 > LATE and abs(lag) > 1
+    if (late := signals.lag_of_velocity(recording)) > 0:
+        found["velocity_late"] = lag * clock.interval if apart else late
+    elif apart:
+        found["velocity_shifted"] = lag * clock.interval
     late = slice(lag, None) if lag >= 0 else slice(None, lag)
     early = slice(None, len(moved) - lag) if lag >= 0 else slice(-lag, None)
     a, b = moved[early], driven[late]
@@ -135,25 +136,6 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     if off > np.log(SCALE):
         return {"velocity_scale": gain}
     return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
-
-
-def _increments(recording: Recording, clock: Clock) -> tuple[np.ndarray, np.ndarray]:
-    """What the position and the velocity say the axis moved in spans that stand out of the noise,
-    both `(n,)` and unbroken.
-    """
-    position, velocity = (np.asarray(x, float) for x in (recording.position, recording.velocity))
-    linked = clock.linked & np.isfinite(position[1:] + position[:-1] + velocity[1:] + velocity[:-1])
-    steps = np.where(linked, np.diff(np.asarray(recording.time, float)), 0.0)
-    mean = np.where(linked, 0.5 * (velocity[1:] + velocity[:-1]), 0.0)
-    moved = np.concatenate([[0], np.cumsum(np.where(linked, np.diff(position), 0.0))])
-    driven = np.concatenate([[0], np.cumsum(mean * steps)])
-    noise, span = signals.counted_noise(position[np.asarray(recording.mask)]), 4
-    while (
-        span < len(moved) // 16
-        and float(np.std(moved[span:] - moved[:-span])) < ABOVE_NOISE * noise
-    ):
-        span *= 2
-    return moved[span:] - moved[:-span], driven[span:] - driven[:-span]
 
 
 def _correlation(moved: np.ndarray, driven: np.ndarray) -> tuple[float, int]:

@@ -148,10 +148,10 @@ def _check(term, projection, recording):
 
 
 def _prepare_batch(recording: Recording) -> Recording:
-    if recording.velocity is not None:
-        return recording
     if signals.is_traced(recording):
         return jax.vmap(signals.prepare)(recording)
+    if recording.velocity is not None and recording.position is None:
+        return recording
     rows = [
         jax.tree.map(lambda x, i=i: np.asarray(x)[i], recording) for i in range(len(recording.time))
     ]

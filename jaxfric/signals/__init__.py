@@ -16,6 +16,11 @@ from .kernels import (
     kernel_slope as kernel_slope,
     kernel_weights as kernel_weights,
 )
+from .late_velocity import (
+    Increments as Increments,
+    lag_of_velocity as lag_of_velocity,
+    without_late_velocity as without_late_velocity,
+)
 from .motion import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     SLIP_SHARE as SLIP_SHARE,

@@ -53,6 +53,7 @@ class Prepared:
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
+        recording = signals.without_late_velocity(recording)
         self._derived = recording.velocity is None
         self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
         if self._derived and not signals.is_traced(recording):
