@@ -28,17 +28,18 @@ from . import limits
 from .preceding import p_value, with_preceding
 from .table import EQUATIONS
 
-# The baseline fitted to all of the command errs by the excess, too, and hides some of it. A cut
-# that takes less than a fifth of that mismatch is none: the fits below are saved.
+# A cut that takes less than a fifth of the mismatch is none: further fits are saved.
 SUSPECT = 0.8
 # Of the mean-square mismatch beyond the level, what there may be below, a third in amplitude: what
 # arrives obeys the baseline. Cogging in a slow motion is as much below friction's level as above.
 BELOW = 0.1
-# What is needed beyond the level is one value: it spreads by less than a quarter of what it does
-# below. At a stop, or with a friction that is most of the force, it spreads as much.
+# What is needed beyond the level is one value: it spreads by less than a quarter of its distance
+# from what is needed below. At a stop, or with a friction that is most of the force, that is as
+# near.
 SPREAD = 0.25
 # A machine that is at its limit for most of the time does not do what it is told: the lower part of
-# the commands arrives, and the baseline is fitted to it first.
+# the commands arrives, and the baseline is fitted to it first. Fitted to all of them it would err by
+# the excess, too, and could hide it.
 ARRIVES, ROUNDS = 1 - limits.MOST, 3
 # A node where the limit is reached holds samples below it too: levels a little higher are tried.
 NEAR = tuple(np.linspace(0.99, 1.05, 13))
@@ -72,15 +73,15 @@ def bounded(
     command = np.asarray(rows.motion.force, float)[moving]
     speed = np.asarray(rows.motion.velocity, float)[moving]
     size, side = np.abs(command), np.sign(command)
-    if limits.cut(size, side * _needed(rows, base)[moving])[1] > SUSPECT:
-        return None
     level, needed = float(np.quantile(size, ARRIVES)), command
     for _ in range(ROUNDS):
         below = _below(rows, level)
         if len(below.rows) < FEWEST_ROWS:
             return None
         needed = side * _needed(rows, fit(base.terms, below, base.betas))[moving]
-        level = limits.cut(size, needed)[0]
+        level, left = limits.cut(size, needed)
+        if left > SUSPECT:
+            return None
     if not _one_level(size, needed, level):
         return None
     limit = limits.limit_of(command, side * needed, speed, motion.recording.unit_names["force"])
@@ -105,7 +106,8 @@ def _one_level(size: np.ndarray, needed: np.ndarray, level: float) -> bool:
     apart = (size - needed) ** 2
     if np.mean(apart[~beyond]) > BELOW * np.mean(apart[beyond]):
         return False
-    return bool(np.std(needed[beyond]) < SPREAD * np.std(needed[~beyond]))
+    away = needed[~beyond] - np.mean(needed[beyond])
+    return bool(np.std(needed[beyond]) < SPREAD * np.sqrt(np.mean(away**2)))
 
 
 def _cut_off(motion: Motion, problem: Problem, level: float) -> Fit:
