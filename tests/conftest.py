@@ -20,8 +20,8 @@ jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
-# Most of the fast tests' time is compiling: programs that run once need no optimisation. The slow
-# tests and what they start compile as users do.
+# Most of the tests' time is compiling: programs that run once need no optimisation. Benchmarks and
+# the documentation's pages compile as users do.
 QUICK = (
     "--xla_cpu_use_fusion_emitters=false",
     "--xla_backend_optimization_level=0",
@@ -43,7 +43,7 @@ def known(options) -> list[str]:
 
 def pytest_configure(config):
     """Set XLA's options before its first program; processes that tests start inherit them."""
-    if config.getoption("-m") != "slow" and "PYTEST_XDIST_WORKER" not in os.environ:
+    if "PYTEST_XDIST_WORKER" not in os.environ:
         os.environ["XLA_FLAGS"] = " ".join(
             [*os.environ.get("XLA_FLAGS", "").split(), *known(QUICK)]
         )
@@ -86,7 +86,7 @@ def pytest_runtest_teardown(item, held=[0]):  # noqa: B006
 def cached_programs(tmp_path_factory, request):
     """What one worker has compiled, the others take from jax's own cache.
 
-    Not in a run of the slow tests: what Python users get is compiled there.
+    Not in a run of the slow tests, of which some count what is compiled.
     """
     if request.config.getoption("-m") == "slow":
         return

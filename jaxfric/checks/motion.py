@@ -113,7 +113,8 @@ def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str,
 
 def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     """The recorded velocity's integral beside the position's increments, over the same spans."""
-    moved, driven = signals.Increments.of(recording)[:2]
+    increments = signals.Increments.of(recording)
+    moved, driven = increments.moved, increments.driven
     if len(moved) < 32 or not (np.any(moved) and np.any(driven)):
         return {}
     shared, lag = _correlation(moved, driven)
@@ -124,7 +125,7 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
         return {"velocity_sign": shared}
     found = {}
     apart = shared**2 - at_once**2 > LATE and abs(lag) > 1
-    if (late := signals.lag_of_velocity(recording)) > 0:
+    if (late := signals.lag_of_velocity(recording, increments)) > 0:
         found["velocity_late"] = lag * clock.interval if apart else late
     elif apart:
         found["velocity_shifted"] = lag * clock.interval

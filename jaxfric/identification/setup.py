@@ -150,10 +150,13 @@ def _check(term, projection, recording):
 def _prepare_batch(recording: Recording) -> Recording:
     if signals.is_traced(recording):
         return jax.vmap(signals.prepare)(recording)
-    if recording.velocity is not None and recording.position is None:
+    if recording.position is None:
         return recording
     rows = [
         jax.tree.map(lambda x, i=i: np.asarray(x)[i], recording) for i in range(len(recording.time))
     ]
-    velocity = np.stack([np.asarray(signals.prepare(row).velocity) for row in rows])
+    prepared = [signals.prepare(row) for row in rows]
+    if all(after is before for after, before in zip(prepared, rows, strict=True)):
+        return recording
+    velocity = np.stack([np.asarray(row.velocity) for row in prepared])
     return dataclasses.replace(recording, velocity=velocity)

@@ -61,16 +61,17 @@ class Increments(NamedTuple):
         return cls(*(each[span:] - each[:-span] for each in (place, driven, speed)), noise)
 
 
-def lag_of_velocity(recording: Recording) -> float:
+def lag_of_velocity(recording: Recording, increments: Increments | None = None) -> float:
     """By how much the recorded velocity is late beside the position, s; zero where it is not.
 
     Zero too where that is no more than a difference quotient or chance makes, where the two are not
-    the same motion, or where the position is too coarse to know better.
+    the same motion, or where the position is too coarse to know better. `increments`: those of the
+    recording, where they are known.
     """
     position, velocity = recording.position, recording.velocity
     if position is None or velocity is None or recording.position_every != 1:
         return 0.0
-    moved, driven, changed, noise = Increments.of(recording)
+    moved, driven, changed, noise = increments or Increments.of(recording)
     power, both = float(moved @ moved), float(moved @ driven)
     if len(moved) < FEWEST or both <= 0 or both**2 < SHARED * power * float(driven @ driven):
         return 0.0
