@@ -535,7 +535,8 @@ def test_blocks_that_disagree_are_chance():
 def tried(seen):
     """The tones to try that the motion does not have, and those that it has; and their spacing."""
     (foreign, none), (own, part) = spectral_lines.time_frequencies(seen)
-    assert (none, part) == (0.0, spectral_lines.ALL)
+    assert none.shape == foreign.shape and not none.any()
+    assert part.shape == own.shape and np.all((part > 0.3) & (part < 1))
     frequencies = spectral_lines.line_frequencies(seen, "time")
     assert len(foreign) + len(own) <= len(frequencies)
     return foreign, own, frequencies[1] - frequencies[0]
@@ -707,7 +708,7 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
 
     alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
     (found,) = named(alone)
-    assert found.trial.candidate.least == spectral_lines.ALL
+    assert 0.5 < found.trial.least < 0.9
     assert found.trial.beta[0] == pytest.approx(rates[0], rel=0.01)
     # With a second like it the motion may drive both.
     assert not named(planted(alone, terms.PeriodicDisturbance(), (1.0, 1.5), (rates[4],)))
@@ -775,7 +776,7 @@ def test_nothing_is_refined_where_nothing_could_be_selected(healthy, monkeypatch
     assert [bool(each.finalists) for each in rounds] == [True, False, False]
     assert [t.gain for t in rounds[0].trials] == [t.gain for t in rounds[2].trials]
     first = rounds[0].trials[0]
-    asked = acceptance.needed(first.candidate, posed.base, seen, posed.base, [])
+    asked = acceptance.needed(first, posed.base, seen, posed.base, [])
     assert asked >= acceptance.LEAST_SHARE * energy
     linear = acceptance.LINEARITY**2 * float(seen.force @ seen.force)
     assert asked >= linear

@@ -125,8 +125,8 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
         return {"velocity_sign": shared}
     found = {}
     apart = shared**2 - at_once**2 > LATE and abs(lag) > 1
-    if (late := signals.lag_of_velocity(recording, increments)) > 0:
-        found["velocity_late"] = lag * clock.interval if apart else late
+    if (seconds := signals.lag_of_velocity(recording, increments)) > 0:
+        found["velocity_late"] = lag * clock.interval if apart else seconds
     elif apart:
         found["velocity_shifted"] = lag * clock.interval
     late = slice(lag, None) if lag >= 0 else slice(None, lag)

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..terms.effect import Effect
-from .candidates import Candidate
-from .contest import Contest, Finalist
+from .contest import Contest, Finalist, Trial
 from .evidence import Evidence
 from .predictions import with_predictions
 from .problem import BETWEEN, WideKernels
@@ -56,7 +55,7 @@ def accepted(
     for finalist in round_.finalists:
         effect, term = finalist.effect, finalist.trial.candidate.term
         gained = current.energy - finalist.energy
-        enough = gained >= needed(finalist.trial.candidate, current, evidence, base, selected)
+        enough = gained >= needed(finalist.trial, current, evidence, base, selected)
         if selected:
             enough &= not _again(finalist, selected)
         level = RAREST if effect.sharp else LEVEL
@@ -69,17 +68,17 @@ def accepted(
 
 
 def needed(
-    candidate: Candidate, current: Fit, evidence: Evidence, base: Fit, selected: list[SelectedTerm]
+    trial: Trial, current: Fit, evidence: Evidence, base: Fit, selected: list[SelectedTerm]
 ) -> float:
     """The energy that a candidate must remove beside the terms selected before, N²."""
-    share = max(_least_share(selected), candidate.least)
+    share = max(_least_share(selected), trial.least)
     least = max(share * current.energy, LINEARITY**2 * float(evidence.force @ evidence.force))
-    if candidate.effect.ubiquitous:
+    if trial.effect.ubiquitous:
         least = max(least, fast(current) ** 2 * len(current.residual))
     if not selected:
         return least
     before = [each.effect for each in selected]
-    ours = least_gain(candidate.effect, before, base.energy, current.energy, LEAST_OF_BASE)
+    ours = least_gain(trial.effect, before, base.energy, current.energy, LEAST_OF_BASE)
     return max(least, ours)
 
 

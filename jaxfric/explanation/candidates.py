@@ -31,14 +31,15 @@ CHANNELS = frozenset({"position", "load", REACTION})
 class Candidate(NamedTuple):
     """A term of an effect, and its grid of β: `betas`, `(G, d)`.
 
-    `lines`: how its waves are computed; `least`: the part of what is left that it must take.
+    `lines`: how its waves are computed; `least`: the part of what is left that it must take at each
+    grid point, `(G,)`, or at all of them.
     """
 
     effect: Effect
     term: AbstractTerm
     betas: np.ndarray
     lines: SpectralLines | None = None
-    least: float = 0.0
+    least: np.ndarray | float = 0.0
 
     @property
     def form(self) -> Hashable:
@@ -198,7 +199,7 @@ def _placed(
 
 
 def at_frequencies(
-    effect: Effect, term: AbstractTerm, values: np.ndarray, least: float = 0.0
+    effect: Effect, term: AbstractTerm, values: np.ndarray, least: np.ndarray | float = 0.0
 ) -> list[Candidate]:
     """A wave at some periods or frequencies, `(G,)`; none where there are none."""
     lines = SpectralLines(*effect.waves(term))

@@ -33,7 +33,7 @@ class Trial(NamedTuple):
     `gain`: R²; `null_mean`: its mean over the draws; `dimension`: how many of its columns are new;
     `threshold`: the R² from which it is significant; `new_part`: the part of the term's force, in
     amplitude, that the model cannot imitate, at all but a tenth of the grid; `others`: further
-    local optima of the grid.
+    local optima of the grid; `least`: the part of what is left that it must take.
     """
 
     candidate: Candidate
@@ -45,6 +45,7 @@ class Trial(NamedTuple):
     threshold: float
     new_part: float
     others: tuple[np.ndarray, ...] = ()
+    least: float = 0.0
 
     @property
     def effect(self) -> Effect:
@@ -96,12 +97,12 @@ def contest(
     field: CandidateSet,
     seed: int = 0,
     among: Callable[[Effect], bool] = lambda effect: True,
-    needed: Callable[[Candidate], float] = lambda candidate: 0.0,
+    needed: Callable[[Trial], float] = lambda trial: 0.0,
 ) -> Contest:
     """Let every candidate compete for the residual of a fit; `evidence` with its predictions.
 
     `among`: whether an effect may be among the finalists; `needed`: the energy, N², that a
-    candidate must remove to be of use. Where none comes near it there are no finalists.
+    trial's candidate must remove to be of use. Where none comes near it there are no finalists.
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
@@ -143,7 +144,7 @@ def contest(
     # Where the base is at a limit of its set, leaving that removes something by itself.
     beside = current.energy - bootstrap.scale**2
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
-    within_reach = any(gain >= needed(t.candidate) for t, gain in zip(eligible, most, strict=True))
+    within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
     finalists = _finals(seen, current, eligible, size, within_reach)
     return Contest(trials, finalists, size)
 
@@ -159,6 +160,7 @@ def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Tr
         candidate, candidate.betas[best], float(scan.gain[best]), float(scan.null_mean[best]),
         int(scan.dimension[best]), p_value, limit, _most(scan.new_part),
         _optima(candidate.betas, scan.gain),
+        float(np.broadcast_to(candidate.least, len(candidate.betas))[best]),
     )  # fmt: skip
 
 

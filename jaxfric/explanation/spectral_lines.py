@@ -114,8 +114,9 @@ def line_frequencies(evidence: Evidence, coordinate: str) -> np.ndarray:
 # an unrelated one holds two of some thousand values.
 OWN = 0.05
 # What the motion drives is in all of its tones or, where it is one wave, in that and its multiples.
-# But a force that is all in another one, or in one of many, has a clock of its own.
-ITSELF, ALL = 0.5, 0.9
+# A law may favour a tone by three times in amplitude (a square by two), nine times in power, beside
+# what the motion has of it. A force that has more of one has a clock of its own.
+ITSELF, FAVOUR = 0.5, 9.0
 # Resolution cells whose median is the noise about a line: thousands would take in the noise's own
 # colour, and of a few the line itself is too many.
 NEIGHBOURS = 64
@@ -124,8 +125,8 @@ SPARSE = 16
 _NONE = np.zeros(0)
 
 
-def time_frequencies(evidence: Evidence) -> Iterator[tuple[np.ndarray, float]]:
-    """Frequencies, Hz, `(G,)`, and the part of what is left that a force there must take.
+def time_frequencies(evidence: Evidence) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Frequencies, Hz, and the part of what is left that a force at each must take, `(G,)` both.
 
     First the frequencies that the motion does not contain, then those that it contains but need not
     drive.
@@ -133,12 +134,13 @@ def time_frequencies(evidence: Evidence) -> Iterator[tuple[np.ndarray, float]]:
     tones = line_frequencies(evidence, "time")
     power = shared(tones, evidence)
     own = power >= OWN
-    yield tones[~own], 0.0
+    yield tones[~own], np.zeros(len(tones) - np.count_nonzero(own))
     if power.max() >= ITSELF:
         lowest = int(np.argmax(power >= ITSELF))
         wave = tones[lowest + int(np.argmax(power[lowest : lowest + OVERSAMPLING]))]
         own &= np.abs(tones - wave * np.round(tones / wave)) > OVERSAMPLING * np.diff(tones[:2])
-    yield tones[own], ALL
+    favoured = FAVOUR * power[own]
+    yield tones[own], favoured / (1 - power[own] + favoured)
 
 
 def shared(tones: np.ndarray, evidence: Evidence) -> np.ndarray:

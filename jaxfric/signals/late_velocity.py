@@ -46,11 +46,10 @@ class Increments(NamedTuple):
         linked = linked & np.isfinite(ends)
         steps = np.where(linked, np.diff(np.asarray(recording.time, float)), 0.0)
         mean = np.where(linked, 0.5 * (velocity[1:] + velocity[:-1]), 0.0)
-        sums = (
+        place, driven, speed = (
             np.concatenate([[0], np.cumsum(np.where(linked, each, 0.0))])
             for each in (np.diff(position), mean * steps, np.diff(velocity))
         )
-        place, driven, speed = sums
         noise, span = counted_noise(position[np.asarray(recording.mask)]), 4
         rough = host_white_noise(np.where(np.isfinite(velocity), velocity, 0.0), linked)
         floors = (place, ABOVE_NOISE * noise), (speed, ABOVE_NOISE * rough)
@@ -58,7 +57,8 @@ class Increments(NamedTuple):
             float(np.std(each[span:] - each[:-span])) < floor for each, floor in floors
         ):
             span *= 2
-        return cls(*(each[span:] - each[:-span] for each in (place, driven, speed)), noise)
+        moved, driven, changed = (each[span:] - each[:-span] for each in (place, driven, speed))
+        return cls(moved, driven, changed, noise)
 
 
 def lag_of_velocity(recording: Recording, increments: Increments | None = None) -> float:

@@ -38,8 +38,8 @@ BELOW = 0.1
 # near.
 SPREAD = 0.25
 # A machine that is at its limit for most of the time does not do what it is told: the lower part of
-# the commands arrives, and the baseline is fitted to it first. Fitted to all of them it would err by
-# the excess, too, and could hide it.
+# the commands arrives, and the baseline is fitted to it first. Fitted to all of them it would err
+# by the excess, too, and could hide it.
 ARRIVES, ROUNDS = 1 - limits.MOST, 3
 # A node where the limit is reached holds samples below it too: levels a little higher are tried.
 NEAR = tuple(np.linspace(0.99, 1.05, 13))
