@@ -43,7 +43,7 @@ EASY_OF_BASE = 0.05
 REVERSAL_OF_BASE = 0.25
 # A term that removes three quarters of the residual needs none of these: the remainder of an
 # idealisation is not of one law's shape. On machines with one effect a second name took two thirds
-# at most.
+# at most. But pushes are no law: each has a moment and a size of its own.
 NEARLY_ALL = 0.75
 
 
@@ -101,10 +101,11 @@ def least_gain(
     if effect.momentary and any(earlier.momentary for earlier in before):
         return OF_BASE * base
     again = any(earlier.at_reversals for earlier in before)
+    most = np.inf if effect.isolated else NEARLY_ALL * remaining
     if again and (effect.at_reversals or effect.isolated):
-        return min(REVERSAL_OF_BASE * base, NEARLY_ALL * remaining)
+        return min(REVERSAL_OF_BASE * base, most)
     if effect.leftover:
-        return min(EASY_OF_BASE * base, NEARLY_ALL * remaining)
+        return min(EASY_OF_BASE * base, most)
     return max(floor * base, min(OF_BASE * base, MOST * remaining))
 
 
