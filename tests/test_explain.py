@@ -55,6 +55,7 @@ from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.simulation.prediction import force_error
 from jaxfric.simulators import Known
+from jaxfric.terms.base import summands
 from jaxfric.terms.effects import EFFECTS, disturbance_pulses
 from jaxfric.terms.sample import Scales
 
@@ -892,6 +893,23 @@ def test_a_size_that_other_terms_could_stand_in_for_is_told_as_a_bound():
         0.75
     )
     assert "by 1.20 N ± 0.23 N" in told(0.1)
+
+
+def test_what_the_held_out_recording_does_not_reach_is_neither_confirmed_nor_refuted(healthy):
+    recording, holdout = healthy
+    place = 0.5 * min(float(np.max(each.position)) for each in healthy)
+    stopped = planted(recording, terms.EndStop(), (500.0,), (place,))
+    short = dataclasses.replace(holdout, mask=np.asarray(holdout.position) < place)
+    found = explain(stopped, "gaussian", short)
+    (stop,) = found.findings
+    assert (stop.effect, stop.confirmed, found.verdict) == ("end_stop", None, "explained")
+    assert stop.sentence.endswith(reported.ELSEWHERE)
+    assert any(isinstance(term, terms.EndStop) for term in summands(found.model.term))
+    # One that does reach it says whether it is there.
+    judged = explain(stopped, "gaussian", holdout)
+    (gone,) = judged.not_confirmed
+    assert (gone.effect, gone.confirmed, judged.findings) == ("end_stop", False, [])
+    assert not any(isinstance(term, terms.EndStop) for term in summands(judged.model.term))
 
 
 @pytest.mark.parametrize("end", ["", "lower_"])

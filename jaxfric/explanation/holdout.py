@@ -4,13 +4,17 @@ Nothing is searched again and nothing exchanged: a finding that does not bring t
 the held-out recording is reported as not confirmed, and the model does without it.
 """
 
+import numpy as np
+
 from ..data.recording import Recording
 from . import parameters as spelled, verification
+from .acceptance import LINEARITY
 from .baseline import as_given
 from .figures import Figures
 from .findings import Findings, Solution
 from .improvement import Improved, errors_of_base, force_errors
 from .motion import Motion
+from .predictions import with_predictions
 from .problem import with_holdout
 from .selection import Selection
 from .uncertainty import by_rows
@@ -41,7 +45,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
 
     Each finding is compared with the model without it, nothing refitted there; then all of them
     together, since the saved model must be no worse than the baseline there either. Effects of a
-    moment need not recur, and are not tested.
+    moment need not recur, and what does not act there cannot: these are not tested.
     """
     findings = _rephased(_with_rows(better.findings, holdout))
     nil = _nil(findings)
@@ -146,11 +150,23 @@ def _borne_out(findings: Findings, number: int) -> bool | None:
 
     `None` for what no other recording can say.
     """
-    if findings.selection.selected[number].effect.momentary:
+    if findings.selection.selected[number].effect.momentary or not _acts_there(findings, number):
         return None
     less = findings.fit_without(number)
     without, with_it = findings.holdout_residuals(less, number)
     return verification.nearer(with_it, without)
+
+
+def _acts_there(findings: Findings, number: int) -> bool:
+    """Whether a finding has a force on the held-out recording that a sensor could tell from none.
+
+    An end stop has none in a motion that does not reach it, a limit none where less is asked for.
+    """
+    problem, selection = findings.examined_in(number)
+    last, index = selection.last, selection.term_index(number)
+    seen = with_predictions(problem.held, last)
+    force = seen.columns(last.terms[index], last.betas[index][None])[0] @ last.alphas[index]
+    return bool(np.linalg.norm(force) >= LINEARITY * np.linalg.norm(seen.force))
 
 
 def _nil(findings: Findings) -> list[bool]:

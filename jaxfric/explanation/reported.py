@@ -24,6 +24,7 @@ NO_POSITION = (
     "No position is recorded: a filter on the recorded velocity looks like a delay or a lag, and "
     "recording the position tells."
 )
+ELSEWHERE = " The held-out recording does not go where it acts, and cannot confirm it."
 REPHASED = (
     " On the held-out recording it has the same period and amplitude at another phase: the "
     "position's zero has moved, as after another homing."
@@ -47,6 +48,9 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         text = sentence(effect.name, parameters, share, rivals, _extent(evidence))
         if selected.rephased:
             text += REPHASED
+        unheard = selected.confirmed is None and not effect.momentary
+        if findings.problem.held is not None and unheard:
+            text += ELSEWHERE
         if effect.late and evidence.motion.position is None:
             text += f" {NO_POSITION}"
         result.append(
