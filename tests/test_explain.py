@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate, terms
+from jaxfric.checks import Remark
 from jaxfric.explanation import (
     acceptance,
     candidates,
@@ -23,6 +24,7 @@ from jaxfric.explanation import (
     findings,
     holdout,
     improvement,
+    inputs,
     intervals,
     least_squares,
     locate,
@@ -893,6 +895,15 @@ def test_a_size_that_other_terms_could_stand_in_for_is_told_as_a_bound():
         0.75
     )
     assert "by 1.20 N ± 0.23 N" in told(0.1)
+
+
+def test_what_is_wrong_with_both_recordings_is_said_once():
+    late = [Remark("velocity_late", f"The velocity is {t} s late.", False) for t in (2e-3, 1.9e-05)]
+    other = Remark("clipped", "The force is clipped at 3 N.", False)
+    texts = [each.text for each in inputs._of_both([other, late[0]], [late[1]])]
+    assert texts == [other.text, "On both recordings: The velocity is 0.002 s late."]
+    texts = [each.text for each in inputs._of_both([late[0]], [other])]
+    assert texts == [late[0].text, "On the held-out recording: The force is clipped at 3 N."]
 
 
 def test_what_the_held_out_recording_does_not_reach_is_neither_confirmed_nor_refuted(healthy):

@@ -1,6 +1,7 @@
 """What an explanation is given: recordings and baseline, checked, and without faults of sensors."""
 
 import dataclasses
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -97,13 +98,33 @@ def prepare(
     remarks += checks.cut(short.num_samples / recording.num_samples)
     sound_holdout, more = (None, []) if holdout is None else inspected(shortened(holdout))
     baseline = shortened(baseline) if isinstance(baseline, Recording) else baseline
-    more = [each._replace(text=f"On the held-out recording: {each.text}") for each in more]
-    remarks = [*remarks, *more]
+    remarks = _of_both(remarks, more)
     remarks = remarks if checked is None else checked.remarks(remarks)
     return Inputs(
         recording, holdout, sound, sound_holdout, baseline, fixed, figures, remarks, checked,
         attributes,
     )  # fmt: skip
+
+
+def _of_both(remarks: list[Remark], held: list[Remark]) -> list[Remark]:
+    """The remarks on a recording and on the held-out one; once what is the same but for numbers."""
+    theirs = {_words(each): each for each in held}
+    both = {_words(each) for each in remarks} & set(theirs)
+    return [
+        *(
+            each._replace(text=f"On both recordings: {each.text}") if _words(each) in both else each
+            for each in remarks
+        ),
+        *(
+            each._replace(text=f"On the held-out recording: {each.text}")
+            for words, each in theirs.items()
+            if words not in both
+        ),
+    ]
+
+
+def _words(remark: Remark) -> str:
+    return re.sub(r"[\d.e+-]*\d", "", remark.text)
 
 
 def _check(recording: Recording, baseline, holdout: Recording | None) -> None:
