@@ -106,12 +106,12 @@ def test_a_velocity_that_is_late_does_not_make_the_friction_wrong():
     speed = np.asarray(sound.velocity)
     late = changed(sound, velocity=np.concatenate([np.full(8, speed[0]), speed[:-8]]))
     model = jf.models.coulomb_viscous()
-    fits = [jf.identify(model, each) for each in (late, changed(sound, velocity=None))]
-    np.testing.assert_array_equal(fits[0].model.alpha, fits[1].model.alpha)
+    fits = [jf.identify(model, each) for each in (late, sound)]
+    np.testing.assert_allclose(fits[0].model.alpha, fits[1].model.alpha, rtol=1e-3)
     assert [r.name for r in fits[0].remarks] == ["velocity_late"]
     both = jf.identify(model, jf.stack([late, sound]))
     np.testing.assert_allclose(both.model.alpha[0], fits[0].model.alpha, rtol=1e-9)
-    np.testing.assert_allclose(both.model.alpha[1], fits[0].model.alpha, rtol=1e-2)
+    np.testing.assert_allclose(both.model.alpha[1], fits[1].model.alpha, rtol=1e-9)
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 0.9])

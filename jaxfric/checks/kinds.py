@@ -62,8 +62,7 @@ KINDS = (
         "velocity_late",
         False,
         "The velocity column is {value:.3g} s late beside the position, as a filter makes it, so "
-        "that friction would change its sign at the wrong time. The position's derivative is taken "
-        "in its place.",
+        "that friction would change its sign at the wrong time. It is taken that much earlier.",
     ),
     Kind(
         "velocity_shifted",

@@ -1,7 +1,5 @@
 """Faults that the signals of a recording show by themselves, on the host."""
 
-import dataclasses
-
 import numpy as np
 
 from .. import signals
@@ -36,10 +34,9 @@ def recorded(recording: Recording) -> np.ndarray:
         found |= position_faults(recording, clock)
         if recording.velocity is not None:
             found |= compared(recording, clock)
-    if "velocity_late" in found:  # which nothing uses
-        recording = dataclasses.replace(recording, velocity=None)
     choice = signals.choose(recording) if recording.velocity is None else None
-    prepared = recording if choice is None else signals.prepare(recording, choice)
+    kept = choice is None and "velocity_late" not in found
+    prepared = recording if kept else signals.prepare(recording, choice)
     velocity = np.asarray(prepared.velocity, float)
     valid &= np.isfinite(velocity)
     if choice is not None:

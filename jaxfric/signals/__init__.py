@@ -19,7 +19,7 @@ from .kernels import (
 from .late_velocity import (
     Increments as Increments,
     lag_of_velocity as lag_of_velocity,
-    without_late_velocity as without_late_velocity,
+    with_timely_velocity as with_timely_velocity,
 )
 from .motion import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,

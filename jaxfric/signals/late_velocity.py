@@ -91,11 +91,18 @@ def lag_of_velocity(recording: Recording, increments: Increments | None = None) 
     return lag if late and lag * float(np.std(changed)) > noise else 0.0
 
 
-def without_late_velocity(recording: Recording) -> Recording:
-    """The recording without its velocity where that is late beside the position.
+def with_timely_velocity(recording: Recording) -> Recording:
+    """The recording with a velocity that is late beside the position taken earlier.
 
-    As it is inside `jax.jit`, where the values are not known.
+    By whole samples, so that its noise stays as white as it was, and what is too fast for a
+    derivative of the position stays in it. The last samples of every unbroken piece repeat the last
+    that is known. As it is inside `jax.jit`, where the values are not known.
     """
-    if is_traced(recording) or lag_of_velocity(recording) == 0:
+    if is_traced(recording) or (lag := lag_of_velocity(recording)) == 0:
         return recording
-    return dataclasses.replace(recording, velocity=None)
+    typical = host_interval(recording)
+    velocity = np.array(recording.velocity)
+    ends = np.flatnonzero(np.append(~host_continuous(recording, typical), True))
+    last = ends[np.searchsorted(ends, np.arange(len(velocity)))]
+    source = np.minimum(np.arange(len(velocity)) + round(lag / typical), last)
+    return dataclasses.replace(recording, velocity=velocity[source])

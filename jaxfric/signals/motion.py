@@ -12,7 +12,7 @@ from ..terms.sample import Scales
 from .choosing import choose
 from .clock import host_continuous, host_interval, interval, is_traced, quantile
 from .derivatives import derivative
-from .late_velocity import without_late_velocity
+from .late_velocity import with_timely_velocity
 from .noise import host_white_noise, white_noise
 from .parabolas import TRACED_REACH, choose_half_width, local_quadratic
 from .polynomial import HALF_WIDTHS, Choice, weights
@@ -27,13 +27,13 @@ SLIP_DEVIATIONS = 4.0
 def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
-    A recorded velocity is kept, but where it is late beside the position. Else the velocity is the
-    zero-phase smoothing derivative of the position, by the local polynomial that
+    A recorded velocity is kept; one that is late beside the position is taken earlier. Else the
+    velocity is the zero-phase smoothing derivative of the position, by the local polynomial that
     [`choose`][jaxfric.signals.choose] finds most accurate or by the one that is given; inside
     `jax.jit` by local parabolas, whose widths reach less far, and a recorded velocity is kept.
     Samples that are not finite but valid by their mask stay: `identify` reports them.
     """
-    recording = without_late_velocity(recording)
+    recording = with_timely_velocity(recording)
     if recording.velocity is not None:
         return recording
     if is_traced(recording):

@@ -53,7 +53,7 @@ class Prepared:
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
-        recording = signals.without_late_velocity(recording)
+        self._recorded = recording
         self._derived = recording.velocity is None
         self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
         if self._derived and not signals.is_traced(recording):
@@ -77,7 +77,7 @@ class Prepared:
         best for the first and the second derivative of the position.
         """
         if self._slope is None:
-            return signals.choose(self.recording, self.recording.velocity)
+            return signals.choose(self._recorded, self._recorded.velocity)
         both = self._slope, signals.choose(self.recording, order=2)
         return max(both, key=lambda each: each.half_width)
 
