@@ -86,7 +86,7 @@ def pytest_runtest_teardown(item, held=[0]):  # noqa: B006
 def cached_programs(tmp_path_factory, request):
     """What one worker has compiled, the others take from jax's own cache.
 
-    Not in a run of the slow tests, of which some count what is compiled.
+    Not in a run of the slow tests, which share few programs: it gains nothing there.
     """
     if request.config.getoption("-m") == "slow":
         return

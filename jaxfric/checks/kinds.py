@@ -62,7 +62,8 @@ KINDS = (
         "velocity_late",
         False,
         "The velocity column is {value:.3g} s late beside the position, as a filter makes it, so "
-        "that friction would change its sign at the wrong time. It is taken that much earlier.",
+        "that friction would change its sign at the wrong time. It is taken earlier by whole "
+        "samples.",
     ),
     Kind(
         "velocity_shifted",

@@ -4,17 +4,15 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
+from ..signals.late_velocity import ALIKE, FEWEST, SHARED
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
 # small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
 UNCERTAIN = 0.01 / 2**0.5
-# Two columns with less than half of their power in common are not the same motion.
-UNRELATED = 0.5
-# A drive's own filter and scaling leave a recorded velocity within a few hundredths; by a quarter
-# it is no filter's doing.
-GAIN, SCALE = 1.05, 1.25
+# A drive's own filter and scaling leave a recorded velocity within a few hundredths.
+GAIN = 1.05
 # A delay counts where it takes 0.2 % of the power that position and velocity share: 2.5° at their
 # frequency, by which a twentieth of the inertia's force is taken for viscous friction.
 LATE = 0.002
@@ -115,26 +113,25 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     """The recorded velocity's integral beside the position's increments, over the same spans."""
     increments = signals.Increments.of(recording)
     moved, driven = increments.moved, increments.driven
-    if len(moved) < 32 or not (np.any(moved) and np.any(driven)):
+    if len(moved) < FEWEST or not (np.any(moved) and np.any(driven)):
         return {}
     shared, lag = _correlation(moved, driven)
     at_once = float(moved @ driven / np.sqrt((moved @ moved) * (driven @ driven)))
-    if abs(at_once) < UNRELATED**0.5:
+    if abs(at_once) < SHARED**0.5:
         return {"velocity_unrelated": at_once**2}
     if shared < 0:
         return {"velocity_sign": shared}
     found = {}
-    apart = shared**2 - at_once**2 > LATE and abs(lag) > 1
-    if (seconds := signals.lag_of_velocity(recording, increments)) > 0:
-        found["velocity_late"] = lag * clock.interval if apart else seconds
-    elif apart:
+    if (late_by := signals.lag_of_velocity(recording, increments)) > 0:
+        found["velocity_late"] = late_by
+    elif shared**2 - at_once**2 > LATE and abs(lag) > 1:
         found["velocity_shifted"] = lag * clock.interval
     late = slice(lag, None) if lag >= 0 else slice(None, lag)
     early = slice(None, len(moved) - lag) if lag >= 0 else slice(-lag, None)
     a, b = moved[early], driven[late]
     gain = float(a @ a / (a @ b)) if a @ b else np.inf
     off = abs(np.log(gain)) if gain > 0 and np.isfinite(gain) else 0.0
-    if off > np.log(SCALE):
+    if off > np.log(ALIKE):
         return {"velocity_scale": gain}
     return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
 
