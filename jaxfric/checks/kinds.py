@@ -61,8 +61,8 @@ KINDS = (
     Kind(
         "velocity_late",
         False,
-        "The velocity column is {value:.3g} s late beside the position, as a filter makes it, so "
-        "that friction would change its sign at the wrong time. It is taken earlier by whole "
+        "The velocity column is {value:.3g} s late beside the position, as by a filter or a cycle, "
+        "so that friction would change its sign at the wrong time. It is taken earlier by whole "
         "samples.",
     ),
     Kind(
