@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
@@ -77,6 +76,17 @@ class Level(NamedTuple):
         return least > max(way * self.curve_low, way * self.curve_high)
 
 
+class Curve(NamedTuple):
+    """The slip curve of a direction: `speed`, m/s, `force` and its band's `low` and `high` ends,
+    N, all in magnitude, `(K,)`.
+    """
+
+    speed: np.ndarray
+    force: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
 class BreakAway(NamedTuple):
     """The levels that the recording tells, and why not where there is none.
 
@@ -128,9 +138,14 @@ def breakaway(recording: Recording, found: Any) -> BreakAway:
     smooth = np.convolve(np.pad(force, NEAR, "edge"), np.full(2 * NEAR + 1, 1 / (2 * NEAR + 1)))
     smooth = smooth[2 * NEAR : -2 * NEAR]
     seen = list(_departures(log, slowest_slip(log), reach))
-    ends = [_transition(log, smooth, noise, mass, found, each) for each in seen]
+    fastest = np.array([float(log.velocity[gone]) for _, gone, *_ in seen])
+    ends = [
+        _transition(log, smooth, noise, mass, curve, each)
+        for curve, each in zip(_curves(found, fastest), seen, strict=True)
+    ]
     transitions = tuple(each for each in ends if each is not None)
-    levels = tuple(level for way in (-1, 1) if (level := _level(transitions, way, found)))
+    ways = zip((-1, 1), _curves(found, np.array([-1.0, 1.0])), strict=True)
+    levels = tuple(level for way, curve in ways if (level := _level(transitions, way, curve)))
     why = "" if levels else _why(seen)
     return BreakAway(levels, transitions, _stated(found.model, levels), why)
 
@@ -177,15 +192,14 @@ def _departures(log: Recording, slowest: float, reach: int) -> Iterator[tuple[An
             yield int(first), gone, way, slowest
 
 
-def _transition(log, smooth, noise, mass, found, departure) -> Transition | None:
+def _transition(log, smooth, noise, mass, curve: Curve, departure) -> Transition | None:
     """The ends of the level that a departure leaves open; `None` where nothing fits."""
     first, gone, way, slowest = departure
     inside = slice(first, gone + 1)
     time, force = np.asarray(log.time, float)[inside], way * smooth[inside]
     speed = np.maximum(way * np.asarray(log.velocity, float)[inside], 0.0)
-    curve, least, _ = _curve(found, way, speed[-1])
-    slip = np.interp(speed, *curve)
-    rise = np.maximum(slip - curve[1][0], 0.0)
+    slip, least = np.interp(speed, curve.speed, curve.force), float(curve.low.min())
+    rise = np.maximum(slip - curve.force[0], 0.0)
     step = np.append(np.diff(time), 0.0)
     # From each sample on: ∫ u − rise, ∫ u, the time, and ∫ u − F.
     most, all_of, left, gained = (
@@ -210,16 +224,18 @@ def _transition(log, smooth, noise, mass, found, departure) -> Transition | None
     return Transition(float(time[-1]), way, dwell, float(force[nearest]), ends[0], ends[1])
 
 
-def _curve(found: Any, way: int, fastest: float):
-    """Speeds and the slip curve there in magnitude, N; the least of its band; the band's ends."""
-    speed = np.geomspace(1e-9, 1.0, SPEEDS) * fastest
-    force = np.asarray(found.model.friction(jnp.asarray(way * speed)))
-    low, high = band(found, way * speed, force)
-    size = np.sort(way * np.stack([low, high]), axis=0)
-    return (speed, way * force), float(size[0].min()), (float(size[0, 0]), float(size[1, 0]))
+def _curves(found: Any, fastest: np.ndarray) -> list[Curve]:
+    """The slip curve up to each of these velocities, `(T,)`, m/s."""
+    if not fastest.size:
+        return []
+    speed = np.geomspace(1e-9, 1.0, SPEEDS) * np.abs(fastest)[:, None]
+    way = np.sign(fastest)[:, None]
+    force, *ends = (way * x.reshape(speed.shape) for x in band(found, np.ravel(way * speed)))
+    low, high = np.sort(np.stack(ends), axis=0)
+    return [Curve(*each) for each in zip(speed, force, low, high, strict=True)]
 
 
-def _level(transitions, way: int, found: Any) -> Level | None:
+def _level(transitions, way: int, curve: Curve) -> Level | None:
     own = [each for each in transitions if each.direction == way]
     if not own:
         return None
@@ -229,10 +245,9 @@ def _level(transitions, way: int, found: Any) -> Level | None:
         error = float(np.std([each.value for each in own], ddof=1)) / len(own) ** 0.5
         scatter = student_quantile(0.975, len(own) - 1) * error
     ends = sorted((float(way * max(low - scatter, 0.0)), float(way * (high + scatter))))
-    (_, force), _, (low, high) = _curve(found, way, 1.0)
-    edge = sorted((way * low, way * high))
-    curve = way * float(force[0])
-    return Level(way, float(way * value), ends[0], ends[1], len(own), curve, edge[0], edge[1])
+    edge = sorted((float(way * curve.low[0]), float(way * curve.high[0])))
+    end = float(way * curve.force[0])
+    return Level(way, float(way * value), ends[0], ends[1], len(own), end, edge[0], edge[1])
 
 
 def _stated(model: Model, levels: tuple[Level, ...]) -> Model:

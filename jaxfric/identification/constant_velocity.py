@@ -6,12 +6,12 @@ part in it, whatever the mass. No model enters. The paper holds each speed in ru
 the recording that was identified the fit saw the same samples, so another one is better evidence.
 """
 
+import dataclasses
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
@@ -22,7 +22,7 @@ from ..looks import text
 from ..models import Model
 from ..signals import counted_noise
 from ..units import VELOCITY, spell
-from .curves import band
+from .curves import band, tangent
 from .stretches import BAND, Stretch, steady, unsteady
 from .uncertainty import COSINES, student_quantile
 
@@ -32,8 +32,6 @@ SEVERAL = 3
 SPEAKS_FOR = 2**0.5
 # As in `checks`: a difference below a twentieth of the friction is no matter.
 MATTERS = 0.05
-# The curve is evaluated at a multiple of so many speeds, so that few programs are compiled.
-PADDED = 32
 
 
 class Point(NamedTuple):
@@ -207,10 +205,7 @@ def _compared(points: Sequence[Point], found: Any) -> list[Point]:
         return list(points)
     count = len(points)
     velocity, force = (np.array([getattr(p, n) for p in points]) for n in ("velocity", "force"))
-    speeds = np.pad(velocity, (0, -count % PADDED), mode="edge")
-    curve = np.asarray(found.model.friction(jnp.asarray(speeds)))
-    low, high = (edge[:count] for edge in band(found, speeds, curve))
-    curve = curve[:count]
+    curve, low, high = band(found, velocity)
     shared = np.array([_quantile(count, p) / _quantile(1, p) for p in points])
     half = shared * np.array([0.5 * (p.high - p.low) for p in points])
     off = np.abs(force - curve)
@@ -238,17 +233,8 @@ def _misshapen(model: Model, velocity, force, half) -> bool:
     # Points without any scatter are of a force that was not measured.
     if not model.term.coordinates <= {"velocity", "acceleration"} or not half.all():
         return False
-    speeds = jnp.asarray(velocity)
-    still = jnp.zeros_like(speeds)
-    motion = Recording(time=still, force=still, velocity=speeds)
-
-    def at(beta):
-        return model.term.with_beta(beta).columns(motion) @ jnp.nan_to_num(model.alpha)
-
-    columns = [np.asarray(model.term.columns(motion))]
-    if model.term.nonlinear:
-        columns.append(np.nan_to_num(np.asarray(jax.jacfwd(at)(model.term.beta()))))
-    design = np.concatenate(columns, axis=1) / half[:, None]
+    known = dataclasses.replace(model, alpha=np.nan_to_num(np.asarray(model.alpha)))
+    design = tangent(known, velocity)[1] / half[:, None]
     if not np.isfinite(design).all():
         return False
     solved = np.linalg.lstsq(design, force / half, rcond=1e-9)[0]

@@ -1,16 +1,19 @@
 """What the picture of an identification is drawn from: its friction curve, and the force."""
 
+import dataclasses
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from .. import signals
 from ..data.recording import Recording
 from ..looks.drawing import Side
-from ..models import weighed
+from ..models import Model, weighed
 from ..units import FORCE, VELOCITY
 from .projections import WeakForm
 from .uncertainty import student_quantile
@@ -21,6 +24,8 @@ BINS = 30
 FEWEST = 3
 # Points of a curve.
 POINTS = 400
+# Speeds that one call takes: so that one program serves all.
+PADDED = 512
 # A Stribeck bump is gone at five of its velocities: exp(−25), and 4 % of a Lorentzian.
 BUMP = 5.0
 # The slowest speed drawn, as a share of the fastest, where no recording says what is resolved.
@@ -131,8 +136,7 @@ def fastest_speed(model: Any) -> float:
 
 def _side(found: Any, sign: int, speed: np.ndarray) -> Side:
     velocity = sign * speed
-    force = np.asarray(found.model.friction(jnp.asarray(velocity)))
-    return Side(sign, velocity, force, *band(found, velocity, force))
+    return Side(sign, velocity, *band(found, velocity))
 
 
 def _bins(speed, force):
@@ -150,23 +154,38 @@ def _bins(speed, force):
     return np.array([speed[group].mean() for group in groups]), mean, spread
 
 
-def band(found: Any, velocity: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pointwise 95 % band of the friction curve by the delta method, low and high, N, `(K,)`.
+def band(found: Any, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The friction curve and its pointwise 95 % band by the delta method, low and high, N, `(K,)`.
 
-    Parameters that are not visible have no part in it.
+    Parameters that are not visible have no part in the band.
     """
-    values = np.array([float(v) for v in found.model.parameters.values()])
-    names = list(found.model.parameters)
+    force, slopes = tangent(found.model, velocity)
     matrix = np.asarray(found.covariance)
-    seen = np.isfinite(np.diagonal(matrix)) & np.isfinite(values)
-    slopes = np.zeros((velocity.size, values.size))
-    for i in np.flatnonzero(seen):
-        step = 1e-6 * max(abs(values[i]), 1e-12)
-        moved = found.model.with_parameters({names[i]: values[i] + step})
-        slopes[:, i] = (np.asarray(moved.friction(jnp.asarray(velocity))) - force) / step
+    known = np.concatenate([np.asarray(found.model.alpha), np.asarray(found.model.term.beta())])
+    seen = np.isfinite(np.diagonal(matrix)) & np.isfinite(known)
     covariance = np.where(seen[:, None] & seen[None, :], matrix, 0.0)
     freedom = next(iter(found.parameters.values())).degrees_of_freedom
     half = student_quantile(0.975, freedom) * np.sqrt(
         np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0)
     )
-    return force - half, force + half
+    return force, force - half, force + half
+
+
+def tangent(model: Model, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The slip friction, N, `(K,)`, and its derivatives by all parameters, `(K, P)`."""
+    blocks = np.pad(velocity, (0, -velocity.size % PADDED), mode="edge").reshape(-1, PADDED)
+    parts = zip(*(_tangent(model, block) for block in blocks), strict=True)
+    force, slopes = (np.concatenate(part)[: velocity.size] for part in parts)
+    return force, slopes
+
+
+@eqx.filter_jit
+def _tangent(model: Model, velocity: Float[np.ndarray, " K"]) -> tuple[Array, Array]:
+    count = model.alpha.shape[-1]
+
+    def friction(values):
+        term = model.term.with_beta(values[count:])
+        return dataclasses.replace(model, term=term, alpha=values[:count]).friction(velocity)
+
+    values = jnp.concatenate([jnp.asarray(model.alpha), model.term.beta()])
+    return friction(values), jax.jacfwd(friction)(values)

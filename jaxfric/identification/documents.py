@@ -11,7 +11,7 @@ from ..data.provenance import sha256, versions
 from ..data.recording import Recording, uniform
 from ..data.summary import facts
 from ..models import name_of
-from ..signals import interval, kernel_half_width, prepare
+from ..signals import host_interval, kernel_half_width, prepare
 from . import breakaway
 from .constant_velocity import ConstantVelocity, remark as contradicts, sentence
 
@@ -69,7 +69,7 @@ def identification(
 def _half_width(recording: Recording) -> float:
     """Half the width of the kernel that is chosen from a recording, s."""
     prepared = prepare(uniform(excerpt(recording)))
-    return kernel_half_width(prepared) * float(interval(prepared))
+    return kernel_half_width(prepared) * host_interval(prepared)
 
 
 def saved(model: Any, *recordings: Recording | None) -> dict[str, Any]:

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .. import checks, signals
+from .. import checks, programs, signals
 from ..data.excerpt import MOST, excerpt
 from ..data.recording import Recording, pad, require, uniform
 from ..identification.projections import WeakForm
@@ -85,20 +85,30 @@ class Prepared:
 def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
     prepared = with_channels(model, motion.recording)
-    momentum: Callable[[Recording], Array | np.ndarray] = model.momentum
-    force: Callable[[Recording], Array | np.ndarray] = model.force
+    momentum: Callable[[Recording], Array | np.ndarray] = partial(_momentum_of, model)
+    force: Callable[[Recording], Array | np.ndarray] = partial(_force_of, model)
     lagging = jnp.zeros_like(prepared.time)
     if any(map(_late, summands(model.term))):
         # The derivative of a force that holds an acceleration needs more smoothing than that of a
         # speed: as much as the force has had.
         lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
-        momentum = model.only(lambda term: not _late(term)).momentum
+        momentum = partial(_momentum_of, model.only(lambda term: not _late(term)))
     if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
         momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
     elif any(map(_stepped, summands(model.term))):
         force = partial(_with_smooth_pushes, model, motion)
     rate = _rate(momentum(prepared), prepared, motion.choices[-1])
     return _later(prepared, force(prepared) + rate + lagging, delay)
+
+
+@programs.compiled
+def _force_of(model: Model, recording: Recording) -> Float[Array, " N"]:
+    return model.force(recording)
+
+
+@programs.compiled
+def _momentum_of(model: Model, recording: Recording) -> Float[Array, " N"]:
+    return model.momentum(recording)
 
 
 def _late(term: AbstractTerm) -> bool:
@@ -200,9 +210,11 @@ def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
 
 def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:
     """A signal at t + `delay`, straight between the samples; held at the ends of a segment."""
-    if delay is None:
-        return signal
-    time, segment = recording.time, recording.segment
+    return signal if delay is None else _shifted(recording.time, recording.segment, signal, delay)
+
+
+@programs.compiled
+def _shifted(time, segment, signal, delay):
     steps = jnp.where(segment[1:] == segment[:-1], jnp.diff(time), 0.0)
     elapsed = jnp.concatenate([jnp.zeros(1, time.dtype), jnp.cumsum(jnp.maximum(steps, 0.0))])
     # Segments far enough apart that none reaches the next one.
