@@ -6,6 +6,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.data.recording import uniform
+from jaxfric.simulation.prediction import force_error
 
 UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"), ("mm", "kN"))
 LENGTHS = (2500, 2600, 2900, 3000, 3333, 3500, 3700, 3999, 4000, 4096)
@@ -46,6 +47,23 @@ def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
         coulomb = fit.parameters["coulomb+"]
         assert abs(coulomb.value - (5 + number)) < 3 * coulomb.standard_error
         assert coulomb.unit == UNITS[number % len(UNITS)][1]
+
+
+def examined(recording):
+    """What the command looks at besides the fit."""
+    found = jax.tree.map(np.asarray, jf.identify("coulomb-viscous", recording))
+    jf.constant_velocity(recording, found)
+    jf.breakaway(recording, found)
+    return force_error(found.model, recording)
+
+
+def test_what_the_command_says_beside_the_fit_is_compiled_once(compiled):
+    assert examined(log(LENGTHS[0], 0)) < 0.1
+    # Not operation by operation, which takes a program each.
+    assert len(compiled) < 20
+    compiled.clear()
+    assert all(examined(log(n, i)) < 0.1 for i, n in enumerate(LENGTHS) if i)
+    assert compiled == []
 
 
 def test_a_session_over_recordings_of_any_length_stays_bounded():

@@ -173,6 +173,7 @@ def band(found: Any, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.n
 
 def tangent(model: Model, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The slip friction, N, `(K,)`, and its derivatives by all parameters, `(K, P)`."""
+    model = dataclasses.replace(model, units=())  # for which nothing is to be compiled anew
     blocks = np.pad(velocity, (0, -velocity.size % PADDED), mode="edge").reshape(-1, PADDED)
     parts = zip(*(_tangent(model, block) for block in blocks), strict=True)
     force, slopes = (np.concatenate(part)[: velocity.size] for part in parts)

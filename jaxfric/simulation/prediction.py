@@ -84,7 +84,7 @@ class Prepared:
 
 def _force(model: Model, motion: Prepared) -> Float[Array, " N"]:
     model, delay = _at_once(model)
-    prepared = with_channels(model, motion.recording)
+    prepared = dataclasses.replace(with_channels(model, motion.recording), units=())
     momentum: Callable[[Recording], Array | np.ndarray] = partial(_momentum_of, model)
     force: Callable[[Recording], Array | np.ndarray] = partial(_force_of, model)
     lagging = jnp.zeros_like(prepared.time)
@@ -198,14 +198,17 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, choice: signals.Cho
 
 
 def _at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
-    """The model with no delay, and by how much later its force acts, s; `None` for at once."""
+    """The model with no delay, and by how much later its force acts, s; `None` for at once.
+
+    Without its units' names, for which nothing is to be compiled anew.
+    """
     name = next(filter(None, (traits(term).shift for term in summands(model.term))), None)
     delay = model.force_delay
     if name is not None:
         late = model.parameters[name]
         delay = late if delay is None else delay + late
         model = model.with_parameters({name: 0.0})
-    return dataclasses.replace(model, force_delay=None), delay
+    return dataclasses.replace(model, force_delay=None, units=()), delay
 
 
 def _later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:
