@@ -1,6 +1,6 @@
 """Marks 1 to 3 on whatever device jax has, in float64 and float32, as JSON lines.
 
-python benchmarks/gpu.py                                      on the accelerator
+python benchmarks/gpu.py [grids] [general] [batches] [whole] [float64] [float32]
 JAX_PLATFORMS=cpu taskset -c 0,1 python benchmarks/gpu.py     on two cores, to compare
 
 Wall seconds, least of the rounds, compilation beside them: an accelerator has no processor seconds.
@@ -18,10 +18,13 @@ import peers
 
 from jaxfric import identify
 from jaxfric.data.recording import stack
+from jaxfric.identification.identifying import solve_rows
 from jaxfric.identification.projections import ClosedWindows
+from jaxfric.identification.setup import set_up
 
 GRIDS = ((20_000, 1000), (200_000, 4000))
 AXES = (256, 4096)
+WHOLE = (256, 4096)
 SAMPLES = 2000
 
 
@@ -68,12 +71,11 @@ def general():
 
 
 def batches():
-    """Mark 3: fits of a whole batch, so many rows at once; and the whole of `identify`."""
+    """Mark 3: fits of a whole batch, so many rows at once."""
     first = peers.problem(SAMPLES)
     problems = [first[1:], *(peers.again(SAMPLES, seed) for seed in range(1, AXES[0]))]
     stacked = jax.tree.map(lambda *x: jnp.stack(x), *problems)
     sides = [list(peers.directions(*each[:2])) for each in problems[:32]]
-    logs = [peers.axis(SAMPLES, seed) for seed in range(AXES[0])]
     for count in AXES:
         rows = jax.tree.map(lambda x, n=count: jnp.concatenate([x] * (n // AXES[0])), stacked)
         for together in (8, 256, 4096):
@@ -90,23 +92,40 @@ def batches():
             worst = np.max(np.abs(np.log(np.asarray(betas[:32], float) / np.array(exact))))
             say(mark=3, axes=count, together=together, compiling=compiling,
                 axes_a_second=count / seconds, error_of_log_beta=float(worst))  # fmt: skip
-        batch = jax.device_put(stack(logs * (count // AXES[0])))
-        start = time.perf_counter()
-        for _ in range(3):
-            before = time.perf_counter()
-            found = jax.block_until_ready(identify("gaussian", batch, projection=ClosedWindows()))
-            last = time.perf_counter() - before
-        first_call = time.perf_counter() - start - 2 * last
+
+
+def whole():
+    """`identify` as called, of a batch: mass, intervals, diagnosis and the checks on the host."""
+    logs = [peers.axis(SAMPLES, seed) for seed in range(AXES[0])]
+    for count in WHOLE:
+        batch = stack(logs * (count // AXES[0]))
+        call = lambda b=batch: jax.block_until_ready(  # noqa: E731
+            identify("gaussian", b, projection=ClosedWindows())
+        )
+        first, found = seconds_of(call)
+        again = min(seconds_of(call)[0] for _ in range(2))
+        setup = set_up("gaussian", batch, ClosedWindows())
+        solve = lambda s=setup: jax.block_until_ready(solve_rows(*s))  # noqa: E731
+        solving = min(seconds_of(solve)[0] for _ in range(2))
         sure = float(np.mean(np.asarray(found.result._value) == 0))
-        say(what="identify", axes=count, first_call=first_call, axes_a_second=count / last,
-            successful=sure)  # fmt: skip
+        say(what="identify", axes=count, first_call=first, axes_a_second=count / again,
+            without_host=count / solving, successful=sure)  # fmt: skip
+
+
+def seconds_of(call):
+    start = time.perf_counter()
+    out = call()
+    return time.perf_counter() - start, out
 
 
 if __name__ == "__main__":
+    given = set(sys.argv[1:])
     for wide in (True, False):
+        if given & {"float64", "float32"} and ("float64" if wide else "float32") not in given:
+            continue
         jax.config.update("jax_enable_x64", wide)
-        for part in (grids, general, batches):
-            if not sys.argv[1:] or part.__name__ in sys.argv[1:]:
+        for part in (grids, general, batches, whole):
+            if not given - {"float64", "float32"} or part.__name__ in given:
                 try:
                     part()
                 except Exception as error:

@@ -77,7 +77,7 @@ class Batches:
         try:
             setup = set_up(self._model, batch, projection, self._bounds, width=width)
             faults = np.stack([item.faults for item in filled])
-            found = devices.solve(setup, faults, self._over)
+            found = devices.solve(setup, lambda: faults, self._over)
         except ValueError as error:  # too short for the kernel
             yield from ((item, failed(item, f"{item.file.path}: {error}")) for item in items)
             return

@@ -6,7 +6,7 @@ core says so before it uses jax (`jax.config.update("jax_num_cpu_devices", 2)`),
 processes are joined by `jax.distributed.initialize`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -19,6 +19,7 @@ from ..data.recording import Recording
 from ..models import Model
 from ..terms.base import AbstractTerm
 from . import identifying as identification
+from .checking import checked, looked_at
 from .identified import Identified, raise_unless_successful
 from .projections import AbstractProjection
 from .setup import Setup, set_up
@@ -58,16 +59,16 @@ def identify(
             "jaxfric.stack([recording]), or use jaxfric.identify()."
         )
     setup = set_up(model, recordings, projection, bounds, grid)
-    found = solve(setup, identification.faults(recordings), over)
+    found = solve(setup, looked_at(recordings).result, over)
     if throw:
         raise_unless_successful(found)
     return found
 
 
-def solve(setup: Setup, faults: np.ndarray, over: Mesh | None = None) -> Identified:
+def solve(setup: Setup, faults: Callable[[], np.ndarray], over: Mesh | None = None) -> Identified:
     """The identification of a batch, each device at its own rows; arrays of numpy.
 
-    `faults` of the recordings, `(B, W)`, as [`faults`][] finds them.
+    `faults` gives those of the recordings, `(B, W)`, and is asked last: as [`looked_at`][] does.
     """
     over = mesh() if over is None else over
     count = setup.recording.time.shape[0]
@@ -80,7 +81,8 @@ def solve(setup: Setup, faults: np.ndarray, over: Mesh | None = None) -> Identif
         batch = jax.tree.map(lambda x: _spread(x, full, over), setup.recording)
         spread = _solve(setup._replace(recording=batch), over)
         found, design = jax.tree.map(lambda x: _gather(x)[:count], spread)
-    return jax.tree.map(np.asarray, identification.checked(found, design, setup.recording, faults))
+    found = checked(found, design, setup.recording, faults())
+    return jax.tree.map(np.asarray, found)
 
 
 @eqx.filter_jit

@@ -19,7 +19,7 @@ from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
 from . import alignment, assessment, reduced
-from .checking import checked, faults
+from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
@@ -28,6 +28,9 @@ from .setup import Setup, set_up
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
 LEAST_COVERED = 0.5
+
+# Samples at once that keep an accelerator busy: some hundred numbers for each are 3 GB.
+SAMPLES = 2**22
 
 
 def identify(
@@ -76,6 +79,7 @@ def identify(
         model, recording if traced or batch else _plain(recording), projection, bounds, grid
     )
     solve = solve_rows if batch else _identify
+    looked = None if traced else looked_at(recording, given)
     found, design = solve(*setup)
     weak = WeakForm(setup.width)
     if projection is None and setup.projection != weak and _too_open(found):
@@ -84,8 +88,8 @@ def identify(
     if align:
         found, design = _aligned(solve, setup, found, design)
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
-    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((found, recording))):
-        found = checked(found, design, recording, faults(recording, given))
+    if looked and not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(found)):
+        found = checked(found, design, recording, looked.result())
     if throw:
         raise_unless_successful(found)
     return found
@@ -130,11 +134,16 @@ def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identi
     def one(row):
         return _identify(term, row, projection, width, given, grid)
 
+    return jax.lax.map(one, recording, batch_size=_together(*recording.time.shape))
+
+
+def _together(count: int, samples: int) -> int | None:
+    """How many rows of so many samples go at once; `None` for one by one."""
+    if jax.default_backend() != "cpu":
+        return max(1, min(SAMPLES // samples, count))
     # Small batches: a refinement loop under vmap makes every row wait for the slowest. Long rows
     # one by one, so that of the ways of `reduced.orthonormal` each goes one, not both.
-    count, samples = recording.time.shape
-    together = None if samples >= reduced.TALL else min(8, count)
-    return jax.lax.map(one, recording, batch_size=together)
+    return None if samples >= reduced.TALL else min(8, count)
 
 
 solve_rows = programs.compiled(_solve_rows)
