@@ -19,10 +19,11 @@ from .motion import (
 )
 
 
-def recorded(recording: Recording) -> np.ndarray:
+def recorded(recording: Recording, ready: signals.Ready | None = None) -> np.ndarray:
     """The numbers of the faults of a recording, `(W,)`, as [`kinds`][] orders them; NaN for none.
 
     Signals of shape `(N,)`, as they were read: with the velocity that was recorded, or none.
+    `ready`: the same prepared, where that has been done.
     """
     found: dict[str, float] = {}
     valid = np.asarray(recording.mask) & np.isfinite(np.asarray(recording.force, float))
@@ -34,10 +35,10 @@ def recorded(recording: Recording) -> np.ndarray:
         found |= position_faults(recording, clock)
         if recording.velocity is not None:
             found |= compared(recording, clock)
-    choice = signals.choose(recording) if recording.velocity is None else None
-    kept = choice is None and "velocity_late" not in found
-    prepared = recording if kept else signals.prepare(recording, choice)
-    velocity = np.asarray(prepared.velocity, float)
+    if ready is None:
+        kept = recording.velocity is not None and "velocity_late" not in found
+        ready = signals.Ready(recording, None) if kept else signals.Ready.of(recording)
+    choice, velocity = ready.choice, np.asarray(ready.recording.velocity, float)
     valid &= np.isfinite(velocity)
     if choice is not None:
         found |= derivative_faults(choice, velocity[valid])

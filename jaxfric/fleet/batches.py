@@ -75,7 +75,8 @@ class Batches:
         if key[0] == "weak_form":
             projection = WeakForm(width)
         try:
-            setup = set_up(self._model, batch, projection, self._bounds, width=width)
+            how = self._model, batch, projection, self._bounds
+            setup = set_up(*how, width=width, prepared=batch)
             faults = np.stack([item.faults for item in filled])
             found = devices.solve(setup, lambda: faults, self._over)
         except ValueError as error:  # too short for the kernel

@@ -14,7 +14,7 @@ from .. import checks
 from ..data import summary
 from ..data.io import read_with_notes
 from ..data.recording import Recording, uniform
-from ..signals import kernel_half_width, prepare
+from ..signals import Ready, kernel_half_width
 from .files import File
 
 
@@ -70,9 +70,9 @@ def _ready(file: File, how: Mapping[str, Any]) -> Item | Failure:
         facts = summary.facts(recording, notes)
         # The named models know velocity only: other channels need not be carried along.
         log = uniform(dataclasses.replace(recording, channels={}))
-        ready = prepare(log)
-        width, faults = kernel_half_width(ready), checks.recorded(log)
-        return Item(file, facts, jax.tree.map(np.asarray, ready), width, faults)
+        ready = Ready.of(log)
+        width, faults = kernel_half_width(ready.recording), checks.recorded(log, ready)
+        return Item(file, facts, jax.tree.map(np.asarray, ready.recording), width, faults)
     except (ValueError, OSError) as error:
         return Failure(file, str(error))
     except MemoryError:

@@ -1,6 +1,7 @@
 """What was identified, checked on the host before anyone sees it."""
 
 import dataclasses
+from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
 import equinox as eqx
@@ -16,25 +17,30 @@ from . import uncertainty
 from .identified import Identified, Result, result_names
 
 
-def faults(recording: Recording, given: int | None = None) -> np.ndarray:
+def faults(
+    recording: Recording, rows: Sequence[signals.Ready], given: int | None = None
+) -> np.ndarray:
     """The faults of a recording as it was read, `(W,)`, or of a batch, `(B, W)`.
 
-    `given`: of how many samples it is an [`excerpt`][jaxfric.data.excerpt].
+    `rows`: the same prepared, each; `given`: of how many samples it is an
+    [`excerpt`][jaxfric.data.excerpt].
     """
     host = jax.tree.map(np.asarray, recording)
-    if recording.time.ndim == 1:
-        found = checks.recorded(host)
+    if host.time.ndim == 1:
+        found = checks.recorded(host, rows[0])
         if given is not None and given > recording.num_samples:
             found[checks.NAMES.index("excerpt")] = recording.num_samples / given
         return found
-    rows = range(len(host.time))
-    return np.stack([checks.recorded(jax.tree.map(lambda x, i=i: x[i], host)) for i in rows])
+    each = (jax.tree.map(lambda x, i=i: x[i], host) for i in range(len(rows)))
+    return np.stack([checks.recorded(row, own) for row, own in zip(each, rows, strict=True)])
 
 
-def looked_at(recording: Recording, given: int | None = None) -> "Future[np.ndarray]":
+def looked_at(
+    recording: Recording, rows: Sequence[signals.Ready], given: int | None = None
+) -> "Future[np.ndarray]":
     """The [`faults`][] of a recording that is not traced, found while others compute."""
     pool = ThreadPoolExecutor(1, "jaxfric")
-    found = pool.submit(faults, recording, given)
+    found = pool.submit(faults, recording, rows, given)
     pool.shutdown(wait=False)  # its thread ends with what it was given
     return found
 

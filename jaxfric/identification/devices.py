@@ -22,7 +22,7 @@ from . import identifying as identification
 from .checking import checked, looked_at
 from .identified import Identified, raise_unless_successful
 from .projections import AbstractProjection
-from .setup import Setup, set_up
+from .setup import Setup, ready_rows, set_up, together
 
 AXIS = "rows"
 
@@ -58,8 +58,10 @@ def identify(
             "devices.identify() spreads a batch; of one recording make one by "
             "jaxfric.stack([recording]), or use jaxfric.identify()."
         )
-    setup = set_up(model, recordings, projection, bounds, grid)
-    found = solve(setup, looked_at(recordings).result, over)
+    rows = ready_rows(recordings)
+    prepared = together(recordings, rows)
+    setup = set_up(model, recordings, projection, bounds, grid, prepared=prepared)
+    found = solve(setup, looked_at(recordings, rows).result, over)
     if throw:
         raise_unless_successful(found)
     return found

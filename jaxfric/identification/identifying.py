@@ -23,7 +23,7 @@ from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
-from .setup import Setup, set_up
+from .setup import Setup, ready_rows, set_up, together
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
@@ -75,11 +75,13 @@ def identify(
         )
     given = recording.num_samples
     recording = recording if traced or batch else excerpt(recording)
-    setup = set_up(
-        model, recording if traced or batch else _plain(recording), projection, bounds, grid
-    )
+    rows = [] if traced else ready_rows(recording)
+    prepared = None
+    if not traced:
+        prepared = together(recording, rows) if batch else _plain(rows[0].recording)
+    setup = set_up(model, recording, projection, bounds, grid, prepared=prepared)
     solve = solve_rows if batch else _identify
-    looked = None if traced else looked_at(recording, given)
+    looked = None if traced else looked_at(recording, rows, given)
     found, design = solve(*setup)
     weak = WeakForm(setup.width)
     if projection is None and setup.projection != weak and _too_open(found):

@@ -1,7 +1,7 @@
 """The setup of an identification: the arguments checked, the recording prepared."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import jax
@@ -38,15 +38,17 @@ def set_up(
     bounds: Mapping[str, tuple[float, float]] | None = None,
     grid: int | None = None,
     width: int | None = None,
+    prepared: Recording | None = None,
 ) -> Setup:
-    """What [`identify`][] solves for its arguments; `width`, where it is known already.
+    """What [`identify`][] solves for its arguments; `width` and the recording `prepared`, where
+    they are known already.
 
     **Raises:** `ValueError` if the model cannot be identified from such a recording.
     """
     term = _structure(model)
     _check_arguments(term, projection, bounds, grid)
-    batched = recording.time.ndim == 2
-    prepared = _prepare_batch(recording) if batched else signals.prepare(recording)
+    if prepared is None:
+        prepared = _prepare(recording)
     _check(term, projection, prepared)
     width = _width(projection, prepared) if width is None else width
     limits = tuple(sorted((name, tuple(map(float, pair))) for name, pair in (bounds or {}).items()))
@@ -147,16 +149,24 @@ def _check(term, projection, recording):
         )
 
 
-def _prepare_batch(recording: Recording) -> Recording:
+def _prepare(recording: Recording) -> Recording:
+    if recording.time.ndim == 1:
+        return signals.prepare(recording)
     if signals.is_traced(recording):
         return jax.vmap(signals.prepare)(recording)
-    if recording.position is None:
-        return recording
-    rows = [
-        jax.tree.map(lambda x, i=i: np.asarray(x)[i], recording) for i in range(len(recording.time))
-    ]
-    prepared = [signals.prepare(row) for row in rows]
-    if all(after is before for after, before in zip(prepared, rows, strict=True)):
-        return recording
-    velocity = np.stack([np.asarray(row.velocity) for row in prepared])
+    return together(recording, ready_rows(recording))
+
+
+def ready_rows(recording: Recording) -> list[signals.Ready]:
+    """Each row of a batch, or the one recording, prepared; nothing of it is traced."""
+    host = jax.tree.map(np.asarray, recording)
+    if host.time.ndim == 1:
+        return [signals.Ready.of(host)]
+    each = (jax.tree.map(lambda x, i=i: x[i], host) for i in range(len(host.time)))
+    return [signals.Ready.of(row) for row in each]
+
+
+def together(recording: Recording, rows: Sequence[signals.Ready]) -> Recording:
+    """A batch with the velocities of its prepared rows."""
+    velocity = np.stack([np.asarray(row.recording.velocity) for row in rows])
     return dataclasses.replace(recording, velocity=velocity)

@@ -24,6 +24,7 @@ from .late_velocity import (
 from .motion import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     SLIP_SHARE as SLIP_SHARE,
+    Ready as Ready,
     counter_velocity as counter_velocity,
     host_scales as host_scales,
     kernel_half_width as kernel_half_width,

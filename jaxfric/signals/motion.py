@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -47,6 +48,21 @@ def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
     usable = np.isfinite(position) | ~np.asarray(recording.mask)
     derived = np.where(usable, slope, np.nan).astype(position.dtype, copy=False)
     return dataclasses.replace(recording, velocity=derived)
+
+
+class Ready(NamedTuple):
+    """A prepared recording, and the local polynomial that its velocity was derived by; `None` for
+    one that was recorded.
+    """
+
+    recording: Recording
+    choice: Choice | None
+
+    @classmethod
+    def of(cls, recording: Recording) -> Self:
+        """A recording that is not traced, prepared, with its signals of shape `(N,)`."""
+        choice = choose(recording) if recording.velocity is None else None
+        return cls(prepare(recording, choice), choice)
 
 
 def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:

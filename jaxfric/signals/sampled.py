@@ -81,13 +81,13 @@ class SampledSignal(NamedTuple):
 
     def windows(self, centres: np.ndarray, block: int, reach: int) -> np.ndarray:
         """Means of blocks around each centre less its own value, `(M, 2 reach + 1)`."""
-        at = centres[:, None] + block * np.arange(-reach, reach + 1)[None, :]
-        base = self.signal[centres][:, None]
-        if block == 1:
-            return self.signal[at] - base
-        total = np.concatenate([[0.0], np.cumsum(self.signal - self.signal[centres[0]])])
-        low = at - block // 2
-        return (total[low + block] - total[low]) / block + self.signal[centres[0]] - base
+        values, low = self.signal, centres - block * reach
+        if block > 1:
+            total = np.concatenate([[0.0], np.cumsum(values - values[centres[0]])])
+            values = (total[block:] - total[:-block]) / block + values[centres[0]]
+            low = low - block // 2
+        around = np.lib.stride_tricks.sliding_window_view(values, 2 * block * reach + 1)
+        return around[low, ::block] - self.signal[centres][:, None]
 
     def noise(self) -> float:
         """[`counted_noise`][] of the longest even stretches; beside a local quartic without any."""
