@@ -34,12 +34,19 @@ def compiled(function: Callable | None = None, *, optimised: int = 0) -> Callabl
     """
     if function is None:
         return lambda function: compiled(function, optimised=optimised)
-    plain = eqx.filter_jit(function)
+
+    @wraps(function)
+    def exactly(*arguments):
+        # A graphics processor multiplies matrices of float32 with ten bits else.
+        with jax.default_matmul_precision("highest"):
+            return function(*arguments)
+
+    plain = eqx.filter_jit(exactly)
 
     @cache
     def quick(level: int | None) -> Callable:
         options: dict[str, Any] = {"compiler_options": quick_options(level)}
-        return eqx.filter_jit(function, **options)
+        return eqx.filter_jit(exactly, **options)
 
     @wraps(function)
     def call(*arguments):
