@@ -72,9 +72,10 @@ def general():
 
 def batches():
     """Mark 3: fits of a whole batch, so many rows at once."""
-    first = peers.problem(SAMPLES)
-    problems = [first[1:], *(peers.again(SAMPLES, seed) for seed in range(1, AXES[0]))]
-    stacked = jax.tree.map(lambda *x: jnp.stack(x), *problems)
+    with jax.default_device(jax.devices("cpu")[0]):  # one by one, each operation by itself
+        first = peers.problem(SAMPLES)
+        problems = [first[1:], *(peers.again(SAMPLES, seed) for seed in range(1, AXES[0]))]
+        stacked = jax.tree.map(lambda *x: np.stack(x), *problems)
     sides = [list(peers.directions(*each[:2])) for each in problems[:32]]
     for count in AXES:
         rows = jax.tree.map(lambda x, n=count: jnp.concatenate([x] * (n // AXES[0])), stacked)

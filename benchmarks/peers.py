@@ -25,6 +25,9 @@ SHORT = bool(os.environ.get("JAXFRIC_BENCH_SHORT"))
 TRUTH = 0.015
 
 
+rows_of = jax.jit(ClosedWindows().rows)
+
+
 def axis(samples, seed=0):
     """A recording of an axis that swings ten times, with noise of 0.5 N on its force."""
     rng = np.random.default_rng(seed)
@@ -39,7 +42,7 @@ def problem(samples, name="gaussian"):
     """Term, prepared recording, rows and bounds of problem (L)."""
     ready = prepare(axis(samples))
     size = scales(ready)
-    rows = jax.jit(ClosedWindows().rows)(ready, size)
+    rows = rows_of(ready, size)
     term = _without_inertia(named(name))
     return term, ready, rows, bounds(term, size)
 
@@ -50,7 +53,7 @@ def again(samples, seed):
     size = scales(ready)
     return (
         ready,
-        ClosedWindows().rows(ready, size),
+        rows_of(ready, size),
         bounds(_without_inertia(named("gaussian")), size),
     )
 
