@@ -30,7 +30,8 @@ MOST = 1 / 3
 LINEARITY = 2e-3
 
 
-# Sharp terms hold the very noise that they are tested against: none of the draws may be as good.
+# Sharp terms hold the very noise that they are tested against, and of a force of one moment no
+# other block of the recording tells whether it was chance: none of the draws may be as good.
 RAREST = 1.5 / (1 + DRAWS)
 
 
@@ -58,7 +59,7 @@ def accepted(
         enough = gained >= needed(finalist.trial, current, evidence, base, selected)
         if selected:
             enough &= not _again(finalist, selected)
-        level = RAREST if effect.sharp else LEVEL
+        level = RAREST if effect.sharp or effect.momentary else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
         if (effect.sharp or term.swings) and not _confirmed(finalist, current, wider, least):

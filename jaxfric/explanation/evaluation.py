@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -37,7 +38,9 @@ def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
         return 1.0
 
     form = _renumbered(term, take)
-    motion = without_known(motion, term.coordinates)
+    # Nothing is compiled for a channel that the term does not read.
+    read = {name: own for name, own in motion.channels.items() if name in term.coordinates}
+    motion = eqx.tree_at(lambda m: m.channels, motion, read)
     return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
 
 
@@ -46,9 +49,9 @@ def sizes(term: AbstractTerm) -> tuple[int, int]:
     return (NEIGHBOURS, STEPPED) if term.stepped else (PAIR, BATCH)
 
 
-def without_known(motion: Recording, kept: frozenset[str] = frozenset()) -> Recording:
+def without_known(motion: Recording) -> Recording:
     """A motion without what a simulator says of it, for which nothing is to be compiled anew."""
-    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN) or k in kept}
+    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN)}
     if len(channels) == len(motion.channels):
         return motion
     return dataclasses.replace(motion, channels=channels)

@@ -42,8 +42,11 @@ class Structure(NamedTuple):
     curve: tuple[np.ndarray, np.ndarray]
 
 
-def locate(evidence: Evidence, current: Fit, seed: int = 0) -> list[Structure]:
-    """Every coordinate, the largest share first; `evidence` with the fit's predictions."""
+def locate(evidence: Evidence, current: Fit, seed: int = 0, lines: bool = True) -> list[Structure]:
+    """Every coordinate, the largest share first; `evidence` with the fit's predictions.
+
+    `lines`: spectral lines too, and not curves alone.
+    """
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     bootstrap = BlockBootstrap(current, block, seed)
 
@@ -59,8 +62,8 @@ def locate(evidence: Evidence, current: Fit, seed: int = 0) -> list[Structure]:
         return _Scanned(f"{name}_lines", scan, peak=float(grid[scan.best]))
 
     available = {"position": evidence.motion.position is not None, "time": evidence.clock}
-    lines = each(along, [name for name, known in available.items() if known])
-    seen = [*each(over, coordinates(evidence).items()), *lines]
+    waves = each(along, [name for name, known in available.items() if known and lines])
+    seen = [*each(over, coordinates(evidence).items()), *waves]
     gains = np.array([s.scan.gain.max() for s in seen])
     p_values = adjusted(gains, np.array([s.scan.drawn for s in seen]))
     found = [_structure(s, float(p), current) for s, p in zip(seen, p_values, strict=True)]

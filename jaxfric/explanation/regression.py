@@ -278,8 +278,13 @@ def _scan(terms, evidence, space, point, unknown):
     owner = np.repeat(np.arange(len(terms)), space.counts)
     free = [i for i in range(len(point)) if owner[i] in unknown]
     grid = (np.arange(GRID) + 0.5) / GRID
+    done: dict[int, np.ndarray] = {}  # where the others were held at a parameter's last scan
     for _ in range(2 if len(free) > 1 else 1):
         for i in free:
+            others_at = np.delete(point, i)
+            if i in done and np.array_equal(done[i], others_at):
+                continue
+            done[i] = others_at
             number = owner[i]
             tried = np.repeat(point[None, :], GRID, axis=0)
             tried[:, i] = grid

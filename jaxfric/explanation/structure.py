@@ -62,7 +62,7 @@ def through_wide(
     if wide is None or not any(s.coordinate in ACCELERATED for s in found):
         return found
     again = fit(current.terms, with_predictions(wide, current), current.betas, 4)
-    located = locate(with_predictions(wide, again), again, seed)
+    located = locate(with_predictions(wide, again), again, seed, lines=False)
     there = {s.coordinate: s for s in located if s.p_value <= LEVEL and s.share >= LEAST_SHARE}
 
     def lasts(each: Structure) -> bool:

@@ -79,9 +79,12 @@ def bounded(
         if len(below.rows) < FEWEST_ROWS:
             return None
         needed = side * _needed(rows, fit(base.terms, below, base.betas))[moving]
+        last = level
         level, left = limits.cut(size, needed)
         if left > SUSPECT:
             return None
+        if level == last:
+            break
     if not _one_level(size, needed, level):
         return None
     limit = limits.limit_of(command, side * needed, speed, motion.recording.unit_names["force"])
