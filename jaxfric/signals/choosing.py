@@ -13,7 +13,7 @@ from ..data.excerpt import MOST, cut, excerpt, pieces
 from ..data.recording import Recording
 from .noise import COLOURED
 from .polynomial import BLOCKS, DEGREES, HALF_WIDTHS, WIDE, Choice, weights
-from .sampled import SampledSignal
+from .sampled import CENTRES, SampledSignal
 
 # The bias of a degree is at most ten times what the next degree takes off it.
 SLOWEST = 0.9
@@ -24,6 +24,9 @@ ALIKE = 1.25
 LARGEST = 1e150
 # Centres at least: their mean square is known to a quarter.
 FEWEST = 32
+# Numbers in the windows of one rung, 2 MB; of the narrower half-widths, up to NARROW, these are
+# eight times as many centres as of the others.
+NUMBERS, NARROW = 2**18, 32
 
 
 class _Level(NamedTuple):
@@ -73,8 +76,8 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
     noise = min(log.noise(), LARGEST)
     tried: list[tuple[float, float, int, int]] = []
     least = dict.fromkeys(DEGREES, 0.0)  # of the bias² of wider candidates, by degree
-    for block, widths in _ladder(log.longest):
-        level = _level(log, block, widths, order)
+    for rung in _ladder(log.longest):
+        level = _level(log, rung, order)
         if level is None:
             continue
         own, sure = (level.bias(noise, factor) for factor in (1.0, COLOURED))
@@ -93,12 +96,24 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
     return Choice(degree, width, float(np.sqrt(risk)) / scale, float(np.sqrt(bias)) / scale, noise)
 
 
-def _ladder(longest: int) -> list[tuple[int, list[int]]]:
-    """Blocks, and half-widths in blocks, for a run of so many samples: an eighth of it at most."""
+class _Rung(NamedTuple):
+    """Half-widths `widths` in blocks of so many samples that are compared at common centres; those
+    from `least` on may be chosen, the others are their pilots.
+    """
+
+    block: int
+    widths: list[int]
+    least: int
+
+
+def _ladder(longest: int) -> list[_Rung]:
+    """The rungs for a run of so many samples: half-widths of an eighth of it at most."""
     most = max(HALF_WIDTHS[0], longest // 8)
-    levels = [(1, [k for k in HALF_WIDTHS if k <= most])]
-    levels += [(b, [k for k in (64, 96, *WIDE) if k * b <= most]) for b in BLOCKS]
-    return [(b, ks) for b, ks in levels if b == 1 or len(ks) > 2]
+    narrow = _Rung(1, [k for k in HALF_WIDTHS if k <= min(most, NARROW)], HALF_WIDTHS[0])
+    over = [k for k in HALF_WIDTHS if NARROW // 2 < k <= most]
+    rungs = [_Rung(1, over, NARROW + 1)]
+    rungs += [_Rung(b, [k for k in (64, 96, *WIDE) if k * b <= most], WIDE[0]) for b in BLOCKS]
+    return [narrow, *(each for each in rungs if max(each.widths, default=0) >= each.least)]
 
 
 class _Shapes(NamedTuple):
@@ -128,17 +143,21 @@ def _shapes(widths: tuple[int, ...], order: int) -> _Shapes:
     return _Shapes(keys, shapes, pilot, share, rough, apart)
 
 
-def _level(log: SampledSignal, block: int, widths: list[int], order: int) -> _Level | None:
-    """The candidates of one block size, `None` where no window of the widest is whole."""
+def _level(log: SampledSignal, rung: _Rung, order: int) -> _Level | None:
+    """The candidates of one rung, `None` where no window of the widest is whole."""
+    block, widths, least = rung
     fitting = _fitting(log, block, widths)
     uneven = not fitting
-    if block > 1 and not set(fitting) & set(WIDE):
+    if max(fitting, default=0) < least and (block > 1 or fitting):
         return None
     widths = fitting or widths
     keys, shapes, pilot, share, rough, apart = _shapes(tuple(widths), order)
     reach = max(widths)
     if not uneven:
-        centres = log.centres(block * reach + block // 2)
+        # A bias is that of the few corners of a motion, so that its mean square is known the better
+        # the more of them are seen.
+        many = max(CENTRES, NUMBERS // (2 * reach + 1))
+        centres = log.centres(block * reach + block // 2, many)
         slopes = log.windows(centres, block, reach) @ shapes
         # A block's mean has less noise.
         rough, apart = rough / block, apart / block
@@ -149,7 +168,7 @@ def _level(log: SampledSignal, block: int, widths: list[int], order: int) -> _Le
         slopes, rough, apart = found[0], found[1], found[2](pilot)
     power = np.mean((slopes - slopes[:, pilot]) ** 2, axis=0)
     scale = block**order
-    offered = np.array([d <= DEGREES[-1] and (block == 1 or k >= WIDE[0]) for d, k in keys])
+    offered = np.array([d <= DEGREES[-1] and k >= least for d, k in keys])
     return _Level(
         [(d, k * block) for d, k in keys],
         offered, power / scale**2, share, rough / scale**2, apart / scale**2,

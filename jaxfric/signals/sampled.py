@@ -11,6 +11,8 @@ from .noise import SHORT, counted_noise
 
 # Centres at which the candidates are compared: the mean square of 512 values is known to 6 %.
 CENTRES = 512
+# Numbers in the windows around the centres of an uneven clock, each with weights of its own.
+NUMBERS = 2**16
 # A clock whose steps differ by more than this is irregular: what it shifts the samples by, times
 # the speed, would be an error of the slope of the same size.
 EVEN = 1e-3
@@ -74,10 +76,10 @@ class SampledSignal(NamedTuple):
             return np.zeros(0, int)
         return np.flatnonzero(self.even[2 * reach :] == self.even[: -2 * reach]) + reach
 
-    def centres(self, reach: int) -> np.ndarray:
+    def centres(self, reach: int, most: int = CENTRES) -> np.ndarray:
         """Some of the [`whole`][] samples, evenly spread over those where the signal moves."""
         whole, near = self.whole(reach), min(reach, 8)
-        return _some(whole[self.signal[whole + near] != self.signal[whole - near]])
+        return _some(whole[self.signal[whole + near] != self.signal[whole - near]], most)
 
     def windows(self, centres: np.ndarray, block: int, reach: int) -> np.ndarray:
         """Means of blocks around each centre less its own value, `(M, 2 reach + 1)`."""
@@ -115,7 +117,7 @@ class SampledSignal(NamedTuple):
         inside = np.flatnonzero(self.valid)
         inside = inside[(inside >= reach) & (inside < len(self.time) - reach)]
         ends = self.segment[inside - reach] == self.segment[inside + reach]
-        index = _some(inside[ends])[:: CENTRES // 128]
+        index = _some(inside[ends], NUMBERS // (2 * reach + 1))
         if not len(index):
             return None
         shapes = np.zeros((len(keys), len(index), 2 * reach + 1))
@@ -129,11 +131,11 @@ class SampledSignal(NamedTuple):
         return slopes, rough, lambda p: np.mean(np.sum((shapes - shapes[p]) ** 2, axis=2), axis=1)
 
 
-def _some(index: np.ndarray) -> np.ndarray:
-    """So many of the indices as there are [`CENTRES`][], evenly spread."""
-    if len(index) <= CENTRES:
+def _some(index: np.ndarray, most: int = CENTRES) -> np.ndarray:
+    """So many of the indices, evenly spread."""
+    if len(index) <= most:
         return index
-    return index[np.linspace(0, len(index) - 1, CENTRES).round().astype(int)]
+    return index[np.linspace(0, len(index) - 1, most).round().astype(int)]
 
 
 def local(
