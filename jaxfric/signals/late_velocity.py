@@ -123,10 +123,14 @@ def with_timely_velocity(recording: Recording) -> Recording:
 
 
 def _earlier(recording: Recording, samples: int) -> Recording:
-    """With the velocity so much earlier; the end of every unbroken piece repeats its last value."""
+    """With the velocity so much earlier; at the end of every unbroken piece, where it is not known,
+    the samples are not valid.
+    """
     velocity = np.asarray(recording.velocity)
     linked = host_continuous(recording, host_interval(recording))
     ends = np.flatnonzero(np.append(~linked, True))
     every = np.arange(len(velocity))
-    source = np.minimum(every + samples, ends[np.searchsorted(ends, every)])
-    return dataclasses.replace(recording, velocity=velocity[source])
+    end = ends[np.searchsorted(ends, every)]
+    source = np.clip(every + samples, 0, end)
+    known = np.asarray(recording.mask) & (every + samples <= end)
+    return dataclasses.replace(recording, velocity=velocity[source], mask=known)

@@ -1,7 +1,7 @@
 """Backward in time, as it were: the force that a recorded motion needs."""
 
 import dataclasses
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cached_property, partial
 from typing import TypeGuard
 
@@ -272,14 +272,17 @@ def in_motion(
     rest, by [`signals.scales`][]; of a model with a `delay`, s, also that much later, which is what
     its force is for. At rest friction takes any value up to break-away, and at a reversal it jumps,
     and the acceleration with it: where the derivative of the momentum reaches into one of these, it
-    is of both sides. `prepared`: as in [`residual`][].
+    is of both sides. Beside an end of the recording, or a gap in it, the derivative is seen from
+    one side, and is that of a few samples. `prepared`: as in [`residual`][].
     """
     motion = Prepared.of(recording) if prepared is None else prepared
     slowest = float(signals.host_scales(excerpt(motion.recording))[0].slowest)
     velocity = np.asarray(motion.recording.velocity)[: recording.num_samples]
     moving = np.abs(velocity) > slowest
-    valid = np.asarray(recording.mask)
-    moving &= valid & ~_beside_turns(np.sign(velocity) * moving, valid, motion.choice.half_width)
+    valid = np.asarray(motion.recording.mask)[: recording.num_samples]
+    width = motion.choice.half_width
+    turns = _turns(np.sign(velocity) * moving, valid)
+    moving &= valid & ~_beside([(turns, width), (_ends(motion, valid), width // 2)], moving & valid)
     if delay:
         moving &= np.asarray(_later(recording, jnp.asarray(moving, float), delay)) == 1
         moving &= _within(recording, delay)
@@ -293,26 +296,47 @@ def _within(recording: Recording, delay: float) -> Bool[np.ndarray, " N"]:
     return np.abs(later - delay) < 0.5 * float(signals.host_interval(recording))
 
 
+# Of both sides of a stop, a reversal or an end: the last sample before it and the first behind it.
+Sides = tuple[np.ndarray, np.ndarray]
 # An axis that is nearer to a stop or a reversal in most of its motion has no other samples.
 MOSTLY = 0.5
 
 
-def _beside_turns(
-    side: Float[np.ndarray, " N"], valid: Bool[np.ndarray, " N"], reach: int
-) -> Bool[np.ndarray, " N"]:
-    """The samples within the `reach` of the derivative from a stop or a reversal, `(N,)`.
+def _turns(side: Float[np.ndarray, " N"], valid: Bool[np.ndarray, " N"]) -> Sides:
+    """Both sides of every stop and reversal.
 
     **Arguments:** `side`, the direction of motion, 0 at rest, `(N,)`; `valid` samples, which alone
     have one.
     """
     known = np.flatnonzero(valid)
     changes = np.flatnonzero(np.diff(side[known]))
-    beside = np.zeros(side.size + 1, int)  # so many more changes are near from here on
-    np.add.at(beside, np.maximum(known[changes] + 1 - reach, 0), 1)
-    np.add.at(beside, np.minimum(known[changes + 1] + reach, side.size), -1)
-    near = np.cumsum(beside[:-1]) > 0
-    few = np.count_nonzero(near & valid & (side != 0)) < MOSTLY * np.count_nonzero(side[known])
-    return near if few else np.zeros_like(near)
+    return known[changes], known[changes + 1]
+
+
+def _ends(motion: Prepared, valid: Bool[np.ndarray, " N"]) -> Sides:
+    """Both sides of every end of the recording and of every gap in it."""
+    recording = motion.recording
+    linked = signals.host_continuous(recording, signals.host_interval(recording))
+    apart = np.flatnonzero(~linked[: valid.size - 1])
+    return np.append(apart, valid.size - 1), np.insert(apart + 1, 0, 0)
+
+
+def _beside(
+    edges: Sequence[tuple[Sides, int]], moving: Bool[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N"]:
+    """The samples within so many of each kind of edge, `(N,)`, but of a kind with which they would
+    be most of those that are `moving`.
+    """
+    near = np.zeros_like(moving)
+    for (lasts, firsts), reach in edges:
+        beside = np.zeros(moving.size + 1, int)  # so many more edges are near from here on
+        for first in (lasts + 1 - reach, firsts):
+            np.add.at(beside, np.maximum(first, 0), 1)
+            np.add.at(beside, np.minimum(first + reach, moving.size), -1)
+        more = near | (np.cumsum(beside[:-1]) > 0)
+        if np.count_nonzero(more & moving) < MOSTLY * np.count_nonzero(moving):
+            near = more
+    return near
 
 
 def unseen(names: Collection[str], prepared: Prepared, moving: Bool[np.ndarray, " N"]) -> list[str]:
