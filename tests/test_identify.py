@@ -304,7 +304,8 @@ def test_a_force_that_is_held_is_aligned(projection):
     assert float(found.model.force_delay) == pytest.approx(0.5 / 250, rel=0.05)
     # Then the noise of 0.2 N is all that is left.
     noise = 0.2 / np.sqrt(np.mean(np.asarray(run.force) ** 2))
-    assert force_error(plain.model, run) > 1.5 * noise
+    # Without, the late force makes as much of an error.
+    assert force_error(plain.model, run) ** 2 > 2 * noise**2
     assert force_error(found.model, run) == pytest.approx(noise, rel=0.1)
 
 

@@ -167,6 +167,7 @@ def ready_rows(recording: Recording) -> list[signals.Ready]:
 
 
 def together(recording: Recording, rows: Sequence[signals.Ready]) -> Recording:
-    """A batch with the velocities of its prepared rows."""
-    velocity = np.stack([np.asarray(row.recording.velocity) for row in rows])
-    return dataclasses.replace(recording, velocity=velocity)
+    """A batch with the velocities of its prepared rows, and where these are known."""
+    each = [(row.recording.velocity, row.recording.mask) for row in rows]
+    velocity, mask = (np.stack(list(map(np.asarray, own))) for own in zip(*each, strict=True))
+    return dataclasses.replace(recording, velocity=velocity, mask=mask)
