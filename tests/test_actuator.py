@@ -11,7 +11,7 @@ import jaxfric as jf
 from jaxfric import models, terms
 from jaxfric.export.parts import unwritten
 from jaxfric.models import coulomb_viscous, from_parameters
-from jaxfric.simulation.prediction import arrived, force_error
+from jaxfric.simulation.errors import arrived, force_error
 
 AXIS = {"inertia": 2.0, "coulomb+": 5.0, "coulomb-": 6.0, "viscous+": 10.0, "viscous-": 11.0}
 FAULTS = {

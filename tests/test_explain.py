@@ -55,7 +55,7 @@ from jaxfric.explanation.inputs import interpolated
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.simulation.prediction import force_error
+from jaxfric.simulation.errors import force_error
 from jaxfric.simulators import Known
 from jaxfric.terms.base import summands
 from jaxfric.terms.effects import EFFECTS, disturbance_pulses

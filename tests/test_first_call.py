@@ -6,7 +6,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.data.recording import uniform
-from jaxfric.simulation.prediction import force_error
+from jaxfric.simulation.errors import force_error
 
 UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"), ("mm", "kN"))
 LENGTHS = (2500, 2600, 2900, 3000, 3333, 3500, 3700, 3999, 4000, 4096)

@@ -11,7 +11,7 @@ import pytest
 import jaxfric as jf
 from jaxfric.identification import checking
 from jaxfric.identification.identified import result_names
-from jaxfric.simulation.prediction import force_error, relative_error
+from jaxfric.simulation.errors import force_error, relative_error
 
 RATE = 1000.0
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.simulation.prediction import Prepared, in_motion
+from jaxfric.simulation.errors import in_motion
+from jaxfric.simulation.prediction import Prepared
 from jaxfric.simulators.columns import GAIN, distinct
 from jaxfric.simulators.inverse import Motion, along
 

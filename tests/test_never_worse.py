@@ -16,7 +16,8 @@ from jaxfric.explanation import doubts, explain, explaining, improvement, least_
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
-from jaxfric.simulation.prediction import Prepared, delay_of, force_error, in_motion, outliers
+from jaxfric.simulation.errors import delay_of, force_error, in_motion, outliers
+from jaxfric.simulation.prediction import Prepared
 
 from .test_explain import CASES, TIME, healthy, planted
 

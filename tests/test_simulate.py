@@ -15,7 +15,8 @@ from hypothesis import given, settings, strategies as st
 from jaxfric import models, terms
 from jaxfric.data.recording import Recording
 from jaxfric.simulation.control import PD, PID, Cascade, Encoder
-from jaxfric.simulation.prediction import predict, relative_error
+from jaxfric.simulation.errors import relative_error
+from jaxfric.simulation.prediction import predict
 from jaxfric.simulation.simulating import default_substeps, simulate
 from jaxfric.terms import AbstractLaw, Parameter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS

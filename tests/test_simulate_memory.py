@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 import jaxfric as jf
 from jaxfric import terms
 from jaxfric.simulation import prediction
-from jaxfric.simulation.prediction import in_motion
+from jaxfric.simulation.errors import force_error, in_motion
 from jaxfric.simulation.simulating import default_substeps
 from jaxfric.terms.base import Sum, summands
 from jaxfric.terms.effects import EFFECTS, compliance
@@ -143,9 +143,9 @@ def test_a_load_that_swings_faster_than_the_acceleration_is_known_is_smoothed_wi
     wanted = jf.Recording(time, 0 * time, place)
     run = jf.simulate(model, wanted, jf.PD(18000.0, 600.0), encoder=jf.Encoder(1e-6))
     seen = dataclasses.replace(run, velocity=None)
-    error = prediction.force_error(model, seen)
+    error = force_error(model, seen)
     monkeypatch.setattr(prediction, "_smoothed", lambda push, *motion: push)
-    assert error < 0.8 * prediction.force_error(model, seen)
+    assert error < 0.8 * force_error(model, seen)
 
 
 @pytest.mark.parametrize("case", ["dry", "flanks"])

@@ -32,7 +32,7 @@ from ..identification.selection import Selection
 from ..looks.text import text
 from ..models import Model
 from ..signals import kernel_half_width, prepare
-from ..simulation.prediction import arrived, delay_of, force_error, in_motion, relative, residual
+from ..simulation.errors import arrived, delay_of, force_error, in_motion, relative, residual
 from ..terms.actuator import PREDICTED, REACTION
 from ..units import SI
 from .messages import message, say

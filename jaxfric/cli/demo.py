@@ -7,7 +7,7 @@ from ..data.io import read, write_table, write_text
 from ..explanation import explain
 from ..identification import documents, tabulate
 from ..report import page, pictures
-from ..simulation.prediction import force_error
+from ..simulation.errors import force_error
 from ..validation import concealed
 from . import commands
 from .commands import today

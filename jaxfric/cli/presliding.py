@@ -14,7 +14,7 @@ from ..identification.identifying import identify
 from ..identification.presliding import Presliding, comparison, presliding, sentence
 from ..looks.text import Block, text
 from ..models import name_of, named
-from ..simulation.prediction import force_error
+from ..simulation.errors import force_error
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.presliding import AbstractBristle
 from .commands import _load, put, read, working

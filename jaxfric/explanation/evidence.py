@@ -158,7 +158,7 @@ def gather(
     default [`kernel_half_width`][jaxfric.signals.kernel_half_width], or as near as samples allow to
     `reach`, s, that of another recording; `delay`, s, by which the
     force is taken later; `reversals`: rows that reach across a reversal too, but none at rest,
-    for judging a model as [`relative_error`][jaxfric.simulation.prediction.relative_error] does.
+    for judging a model as [`relative_error`][jaxfric.simulation.errors.relative_error] does.
 
     **Raises:** `ValueError` if the axis hardly slips.
     """

@@ -43,7 +43,7 @@ class Explanation:
       with `check`, whether it is `wrong`, `value` and `text`.
 
     `fit["force_error"]` is `jf.predict(model, recording)` and a subtraction, as `force_error` in
-    `jaxfric.simulation.prediction`; `fit["filtered_force_error"]` the same through the kernel by
+    `jaxfric.simulation.errors`; `fit["filtered_force_error"]` the same through the kernel by
     which effects are looked for, `width` its half-width, s.
     """
 

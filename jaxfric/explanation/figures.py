@@ -10,7 +10,8 @@ import numpy as np
 from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model
-from ..simulation.prediction import Prepared, delay_of, in_motion, relative, residual, unseen
+from ..simulation.errors import delay_of, in_motion, relative, residual, unseen
+from ..simulation.prediction import Prepared
 
 # Parts of a record that are compared: none shares more than its ends with another.
 PARTS = 16
@@ -47,7 +48,7 @@ class Figures:
         return cast(model, self.dtype)
 
     def here(self, model: Model, delay: float | None = None) -> float:
-        """As [`force_error`][jaxfric.simulation.prediction.force_error], on the recording itself.
+        """As [`force_error`][jaxfric.simulation.errors.force_error], on the recording itself.
 
         `delay`: that of another model, s, whose samples the figure is to be taken over.
         """

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..models import Model
-from ..simulation.prediction import delay_of
+from ..simulation.errors import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import verification
 from .acceptance import LEAST_SHARE

@@ -15,7 +15,7 @@ from ..data.recording import Recording, check_same_units, require, require_force
 from ..identification.identified import Identified
 from ..identification.uncertainty import Estimate
 from ..models import NAMED, Model
-from ..simulation.prediction import outliers
+from ..simulation.errors import outliers
 from ..simulators import AbstractSimulator, Attribute, Known, same_motion
 from ..terms import KNOWN, KNOWN_FORCE
 from ..terms.base import AbstractTerm

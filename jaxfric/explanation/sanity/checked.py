@@ -11,7 +11,7 @@ import numpy as np
 from ...checks import Remark
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
-from ...simulation.prediction import outliers
+from ...simulation.errors import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
 from ..explained import Explanation
 from ..figures import Figures, cast

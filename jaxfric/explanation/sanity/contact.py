@@ -10,7 +10,7 @@ from jaxtyping import Bool
 from ... import signals
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
-from ...simulation.prediction import in_motion
+from ...simulation.errors import in_motion
 from ...terms import KNOWN_FORCE
 from ..significance import FEWEST
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
-from ...simulation.prediction import Prepared, in_motion
+from ...simulation.errors import in_motion
+from ...simulation.prediction import Prepared
 from ...terms import KNOWN_FORCE
 from ..least_squares import solve
 from ..significance import FEWEST
