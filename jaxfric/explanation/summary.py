@@ -62,11 +62,14 @@ def summarise(
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(better)]
     errors = document(better, filtered, models[1], figures)
-    remarks = [*remarks, *_elsewhere(errors)]
+    apart = _elsewhere(errors)
+    remarks = [*remarks, *apart]
     new, later = (
         [s for s in some if s.coordinate not in known.structured] for some in (before, after)
     )
     missing = rough(filtered, shares) or beside_rows(errors) or halved(refuted)
+    # Values that are known in both recordings and differ: no one model holds for both.
+    missing |= bool(apart and errors.get("holdout_values"))
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     absent = (*better.dropped, *(finding.effect for finding in refuted))
