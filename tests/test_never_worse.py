@@ -12,12 +12,21 @@ import pytest
 from jaxfric import Recording, identify, models, predict, read, terms
 from jaxfric.cli import main
 from jaxfric.data import io
-from jaxfric.explanation import doubts, explain, explaining, improvement, least_squares, regression
+from jaxfric.explanation import (
+    acceptance,
+    doubts,
+    explain,
+    explaining,
+    improvement,
+    least_squares,
+    regression,
+)
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
 from jaxfric.simulation.errors import delay_of, force_error, in_motion, outliers
 from jaxfric.simulation.prediction import Prepared
+from jaxfric.terms.effects import EFFECTS
 
 from .test_explain import CASES, TIME, healthy, planted
 
@@ -307,6 +316,24 @@ def test_a_late_velocity_that_ends_in_motion_does_not_spoil_the_error():
     assert force_error(found.model, run) < 0.02
     whole = in_motion(run)
     assert not whole[-6:].any() and whole[:-100].mean() > 0.8
+
+
+@pytest.mark.parametrize(
+    "effect, p_value, taken",
+    [("cogging", 0.004, True), ("gain_step", 0.004, False), ("gain_step", 0.002, True)],
+)
+def test_what_nothing_else_can_bear_out_needs_the_rarest_chance(
+    effect, p_value, taken, monkeypatch
+):
+    monkeypatch.setattr(acceptance, "needed", lambda *known: 0.0)
+    term = types.SimpleNamespace(swings=False)
+    trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
+    one = types.SimpleNamespace(
+        effect=EFFECTS[effect], trial=trial, score=1.0, p_value=p_value, energy=0.5
+    )
+    round_, current = types.SimpleNamespace(finalists=[one]), types.SimpleNamespace(energy=1.0)
+    found = acceptance.accepted(round_, current, None, (None, None), None, [])
+    assert (found is one) is taken
 
 
 def test_what_lasts_or_is_usual_is_no_outlier(healthy):

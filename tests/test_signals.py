@@ -469,3 +469,21 @@ def test_magnitudes_on_the_host_are_those_of_a_program(kind):
         np.testing.assert_allclose(ours, theirs, rtol=tolerance)
     theirs = signals.velocity_noise(log, expected.interval)
     np.testing.assert_allclose(noise, theirs, rtol=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_shift_by_a_sample_does_not_turn_the_choice_of_a_width(seed):
+    """The bias is that of a few corners: of too few places some hold one, and some hold none."""
+    acceleration = np.zeros(10_000)
+    for start in range(600, 10_000, 2400):
+        acceleration[start : start + 30] = 60.0
+        acceleration[start + 1200 : start + 1230] = -60.0
+    noise = np.random.default_rng(seed).normal(0, 2e-3, acceleration.size)
+    speed = 1e-3 * np.cumsum(acceleration) + noise
+    time = 1e-3 * np.arange(9990)
+
+    def width(shift):
+        velocity = speed[shift : shift + time.size]
+        return signals.choose(jf.Recording(time, 0 * time, velocity=velocity), velocity).half_width
+
+    assert len({width(shift) for shift in range(8)}) == 1

@@ -3,6 +3,7 @@
 import dataclasses
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -236,6 +237,11 @@ def uniform(recording: Recording) -> Recording:
     length = next(int(f * power) for f in steps if f * power >= recording.num_samples)
     pieces = 1 << (recording.num_segments - 1).bit_length()
     return _anonymous(pad(recording, length), pieces)
+
+
+def row_of(batch: Any, number: int) -> Any:
+    """One row of a batch: every array without its leading axis."""
+    return jax.tree.map(lambda x: x[number], batch)
 
 
 def stack(recordings: Sequence[Recording]) -> Recording:

@@ -7,6 +7,7 @@ import jax
 import numpy as np
 from jax.sharding import Mesh
 
+from ..data.recording import row_of
 from ..identification import devices, documents
 from ..identification.identified import Identified
 from ..identification.identifying import LEAST_COVERED
@@ -83,7 +84,7 @@ class Batches:
             yield from ((item, failed(item, f"{item.file.path}: {error}")) for item in items)
             return
         for i, item in enumerate(items):
-            alone = jax.tree.map(lambda x, i=i: x[i], found)
+            alone = row_of(found, i)
             if self._projection == "auto" and key[0] != "weak_form":
                 if alone.covered < LEAST_COVERED:
                     yield from self._join(("weak_form", *key[1:]), item)

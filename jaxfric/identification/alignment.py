@@ -7,7 +7,7 @@ import numpy as np
 
 from .. import signals
 from ..checks import Design, lateness
-from ..data.recording import Recording
+from ..data.recording import Recording, row_of
 from ..data.shifting import shifted
 
 # Estimates to first order; the second is off by the square of what the first has left.
@@ -25,8 +25,7 @@ def later(design: Design, recording: Recording) -> np.ndarray:
     host = jax.tree.map(np.asarray, (design, recording))
     if recording.time.ndim == 1:
         return np.asarray(_later(*host))
-    rows = range(len(recording.time))
-    return np.array([_later(*jax.tree.map(lambda x, i=i: x[i], host)) for i in rows])
+    return np.array([_later(*row_of(host, i)) for i in range(len(recording.time))])
 
 
 def _later(design: Design, recording: Recording) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import checks, signals
 from ..checks import Design
-from ..data.recording import Recording
+from ..data.recording import Recording, row_of
 from ..terms.base import changed_columns, summands
 from . import uncertainty
 from .identified import Identified, Result, result_names
@@ -31,8 +31,7 @@ def faults(
         if given is not None and given > recording.num_samples:
             found[checks.NAMES.index("excerpt")] = recording.num_samples / given
         return found
-    each = (jax.tree.map(lambda x, i=i: x[i], host) for i in range(len(rows)))
-    return np.stack([checks.recorded(row, own) for row, own in zip(each, rows, strict=True)])
+    return np.stack([checks.recorded(row_of(host, i), own) for i, own in enumerate(rows)])
 
 
 def looked_at(
@@ -66,8 +65,7 @@ def checked(
     moving = _moving(found, design.columns.shape[-1])
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
-        row = jax.tree.map(lambda x, i=i: x[i], host) if batch else host
-        own, log = row
+        own, log = row_of(host, i) if batch else host
         late, interval = checks.lateness(own, moving), signals.host_interval(log)
         fit = checks.Estimated(alpha, half, interval, late)
         fitted = checks.fitted(own, float(error), fit)

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from .. import signals
-from ..data.recording import Recording, described
+from ..data.recording import Recording, described, row_of
 from ..models import Model, named
 from ..terms.actuator import PREDICTED, REACTION
 from ..terms.base import AbstractTerm
@@ -67,9 +67,9 @@ def _plan(term, recording, projection, given) -> grids.Plan | None:
     if recording.time.ndim == 1:
         return grids.plan(term, given, signals.host_scales(recording)[0], width)
     count = recording.time.shape[0]
-    each = (jax.tree.map(lambda x, i=i: x[i], recording) for i in range(count))
-    rows = [signals.host_scales(row)[0] for row in each]
-    return grids.plan(term, given, jax.tree.map(lambda *x: np.stack(x), *rows), width)
+    each = (row_of(recording, i) for i in range(count))
+    sizes = [signals.host_scales(one)[0] for one in each]
+    return grids.plan(term, given, jax.tree.map(lambda *x: np.stack(x), *sizes), width)
 
 
 def _width(projection: AbstractProjection | None, recording: Recording) -> int:
@@ -79,8 +79,8 @@ def _width(projection: AbstractProjection | None, recording: Recording) -> int:
     if recording.time.ndim == 1 or signals.is_traced(recording):
         return signals.kernel_half_width(recording)
     count = recording.time.shape[0]
-    some = [jax.tree.map(lambda x, i=i: x[i], recording) for i in range(0, count, -(-count // 8))]
-    return sorted(signals.kernel_half_width(row) for row in some)[len(some) // 2]
+    some = [row_of(recording, i) for i in range(0, count, -(-count // 8))]
+    return sorted(signals.kernel_half_width(one) for one in some)[len(some) // 2]
 
 
 def _structure(model) -> AbstractTerm:
@@ -162,12 +162,11 @@ def ready_rows(recording: Recording) -> list[signals.Ready]:
     host = jax.tree.map(np.asarray, recording)
     if host.time.ndim == 1:
         return [signals.Ready.of(host)]
-    each = (jax.tree.map(lambda x, i=i: x[i], host) for i in range(len(host.time)))
-    return [signals.Ready.of(row) for row in each]
+    return [signals.Ready.of(row_of(host, i)) for i in range(len(host.time))]
 
 
 def together(recording: Recording, rows: Sequence[signals.Ready]) -> Recording:
     """A batch with the velocities of its prepared rows, and where these are known."""
-    each = [(row.recording.velocity, row.recording.mask) for row in rows]
+    each = [(one.recording.velocity, one.recording.mask) for one in rows]
     velocity, mask = (np.stack(list(map(np.asarray, own))) for own in zip(*each, strict=True))
     return dataclasses.replace(recording, velocity=velocity, mask=mask)
