@@ -33,17 +33,27 @@ def bounded(
     the dry friction that there is, `dry` @ alpha: friction does not drive.
 
     An axis that moved was held by no more friction than the largest force there was. Between
-    reversals a filter sees next to nothing of a narrow bump and would take any height for it.
+    reversals a filter sees next to nothing of a narrow bump and would take any height for it. Of
+    one that it sees less than half of, the height is at most the dry friction: friction at rest is
+    up to twice that in slip.
     """
     alpha = _within(columns, target, bumps, peak)
-    tied = np.zeros(len(alpha), bool)
+    tied = np.zeros(len(alpha))
     if dry @ alpha <= 0:  # a force with the wrong sign is for others to tell
         return alpha
-    while (beyond := bumps & ~tied & (alpha < -(dry @ alpha))).any():
-        tied |= beyond
-        joined = columns[:, ~tied] - np.outer(columns[:, tied].sum(axis=1), dry[~tied])
-        alpha[~tied] = _within(joined, target, bumps[~tied], peak)
-        alpha[tied] = -(dry @ alpha)
+    tails = bumps & (np.max(np.abs(columns), axis=0, initial=0.0) < 0.5)
+
+    def beyond() -> np.ndarray:
+        most = dry @ alpha
+        over = np.where(bumps & (alpha < -most), -1.0, np.where(tails & (alpha > most), 1.0, 0.0))
+        return np.where(tied == 0, over, 0.0)
+
+    while (more := beyond()).any():
+        tied += more
+        free = tied == 0
+        joined = columns[:, free] + np.outer(columns @ tied, dry[free])
+        alpha[free] = _within(joined, target, bumps[free], peak)
+        alpha[~free] = tied[~free] * (dry @ alpha)
     return alpha
 
 

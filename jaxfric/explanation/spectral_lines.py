@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..signals import kernel
-from ..terms.effect import SIDE
+from ..terms.effect import RECURS, SIDE
 from .evidence import Evidence
 from .regression import Fit
 from .significance import LEVEL
@@ -94,13 +94,13 @@ _GAINS = _transform()
 def line_frequencies(evidence: Evidence, coordinate: str) -> np.ndarray:
     """Equally spaced frequencies that resolve every line of a coordinate.
 
-    From one period in the range (one and a half in time: fewer are a drift) to where a wave at
+    From one period in the range (two in time: fewer are a drift) to where a wave at
     the slow quartile of the speed has half a period in the kernel: shorter ones are averaged away.
     """
     limits = evidence.limits
     top = 0.5 / evidence.reach
     if coordinate == "time":
-        span, low = limits.duration, 1.5 / limits.duration
+        span, low = limits.duration, RECURS / limits.duration
     else:
         span = limits.high - limits.low
         speed = np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])

@@ -115,6 +115,8 @@ def product(axes) -> np.ndarray:
 
 # Fewer periods in the stroke are no repetition.
 REPEATED = 1.5
+# Over time, where anything may wander, a wave has repeated once its second period is over.
+RECURS = 2.0
 
 
 def slowly(period: str, text: str) -> Callable[[Mapping[str, float], Extent], str | None]:

@@ -57,6 +57,10 @@ class DisturbancePulses(AbstractLaw):
 OUTSTANDING = 5.0
 # More pushes than this, or more of the time than that, are no isolated ones.
 MOST, LARGEST_PART = 12, 0.2
+# A push is isolated if there is none of the other sign within its own breadth on either side, two
+# widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of the
+# encoder that come and go in the controller's velocity.
+APART = 4
 
 
 def pulses(left: Residual) -> Iterator[AbstractTerm]:
@@ -101,7 +105,7 @@ def _at_reversals(left: Residual, places: list[float], width: float) -> bool:
 
 
 def _outstanding(residual, time, width, spacing) -> list[float]:
-    """Times of the pushes of one width, between the rows where their peak lies."""
+    """Times of the isolated pushes of one width that are seen from begin to end, s."""
     reach = int(np.ceil(width / spacing))
     shape = (
         np.cos(0.5 * np.pi * np.clip(np.arange(-reach, reach + 1) * spacing / width, -1, 1)) ** 2
@@ -111,14 +115,18 @@ def _outstanding(residual, time, width, spacing) -> list[float]:
     height = np.convolve(residual, shape / np.sqrt(shape @ shape), "same")
     spread = np.median(np.abs(height)) / 0.6745
     left = np.abs(height) / max(spread, 1e-300)
-    places: list[float] = []
-    for _ in range(MOST):
-        peak = int(np.argmax(left))
-        if left[peak] < OUTSTANDING:
-            return sorted(places)
-        places.append(_summit(time, left, peak))
+    found: list[tuple[float, float]] = []
+    while left[peak := int(np.argmax(left))] >= OUTSTANDING:
+        if len(found) == MOST:
+            return []
+        found.append((_summit(time, left, peak), float(np.sign(height[peak]))))
         left[max(0, peak - 2 * reach) : peak + 2 * reach + 1] = 0.0
-    return [] if np.max(left) >= OUTSTANDING else sorted(places)
+    return sorted(
+        place
+        for place, sign in found
+        if time[0] + width <= place <= time[-1] - width
+        and not any(abs(place - at) < APART * (width + 2 * spacing) and sign != other for at, other in found)
+    )
 
 
 def _summit(time, height, peak) -> float:

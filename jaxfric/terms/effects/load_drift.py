@@ -4,13 +4,14 @@ from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from numpy.polynomial import legendre
 
 from ...units import (
     FORCE,
 )
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect
+from ..effect import RECURS, Effect
 from ..sample import Parameter, Sample, Scales
 from ..text import literal, signed
 
@@ -58,10 +59,15 @@ def _horner(coefficients, variable: str) -> str:
     return text
 
 
+# A straight line, a cubic, and as much as follows a wave up to where it is a tone: of k periods over
+# the record, polynomials above the degree πk + 3 have less than a fiftieth.
+DEGREES = (1, 3, 6, int(np.pi * RECURS + 3))
+
+
 def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:
-    """A straight line, and a cubic polynomial, over the recording."""
+    """Polynomials of several degrees over the recording."""
     start, duration = float(scales.start), float(scales.duration)
-    return tuple(LoadDrift(start, duration, degree) for degree in (1, 3))
+    return tuple(LoadDrift(start, duration, degree) for degree in DEGREES)
 
 
 LOAD_DRIFT = Effect(

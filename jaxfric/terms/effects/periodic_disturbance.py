@@ -10,18 +10,18 @@ from ...units import (
     FREQUENCY,
 )
 from ..base import AbstractLaw
-from ..effect import Effect, Waves
+from ..effect import RECURS, Effect, Waves
 from ..position import wave, waves
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
 from ..text import TURN, literal
 
 
 def _frequency_bounds(scales):
-    """From one and a half periods in the record to half of Nyquist's frequency.
+    """From the slowest that repeats in the record to half of Nyquist's frequency.
 
     Fewer periods are a drift; above, a force held over a sample is no longer the tone that acts.
     """
-    return 1.5 / scales.duration, 0.25 / scales.interval
+    return RECURS / scales.duration, 0.25 / scales.interval
 
 
 def _record(scales):
