@@ -50,9 +50,10 @@ def compiled(function: Callable | None = None, *, optimised: int = 0) -> Callabl
 
     @wraps(function)
     def call(*arguments):
-        if not _alone(arguments):
+        leaves = jax.tree.leaves(arguments)
+        if not _alone(leaves):
             return plain(*arguments)
-        return quick(optimised if _few(arguments) else None)(*arguments)
+        return quick(optimised if _few(leaves) else None)(*arguments)
 
     return call
 
@@ -64,25 +65,29 @@ def quick_options(optimised: int | None = 0) -> dict[str, Any]:
     `optimised`: how much, `None` for wholly.
     """
     level = {} if optimised is None else {"xla_backend_optimization_level": optimised}
-    options = _QUICK | level
-
-    def known(name: str) -> bool:
-        with suppress(jax.errors.JaxRuntimeError):
-            jax.jit(lambda: 0).lower().compile({name: options[name]})
-            return True
-        return False
-
-    return {name: value for name, value in options.items() if known(name)}
+    return {name: value for name, value in (_QUICK | level).items() if _known(name, value)}
 
 
-def _few(arguments) -> bool:
-    arrays = filter(eqx.is_array, jax.tree.leaves(arguments))
-    return max((leaf.size for leaf in arrays), default=0) <= QUICK_SAMPLES
+@cache
+def _known(name: str, value: Any) -> bool:
+    with suppress(jax.errors.JaxRuntimeError):
+        _nothing().compile({name: value})
+        return True
+    return False
 
 
-def _alone(arguments) -> bool:
+@cache
+def _nothing() -> Any:
+    return jax.jit(lambda: 0).lower()
+
+
+def _few(leaves: list) -> bool:
+    return max((leaf.size for leaf in filter(eqx.is_array, leaves)), default=0) <= QUICK_SAMPLES
+
+
+def _alone(leaves: list) -> bool:
     """Whether nothing is traced and there is one device, a CPU."""
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(arguments))
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
     return not traced and jax.default_backend() == "cpu" and jax.device_count() == 1
 
 

@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric import programs
 from jaxfric.data.recording import uniform
+from jaxfric.explanation import regression
 from jaxfric.simulation.errors import force_error
 
 UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"), ("mm", "kN"))
@@ -24,18 +26,29 @@ def log(count: int, number: int) -> jf.Recording:
     return jf.Recording(time, force, position, source=f"axis {number}.csv", units=units)
 
 
-@pytest.fixture
-def compiled():
-    """Names of the programs that XLA compiles while the test runs."""
+def programs_of(stage):
+    """Names of the programs that come to a stage while a test runs."""
     names: list[str] = []
 
     def heard(event, seconds, **about):
-        if "backend_compile" in event:
+        if stage in event:
             names.append(about.get("fun_name", event))
 
     jax.monitoring.register_event_duration_secs_listener(heard)
     yield names
     names = []  # the listener stays, and is heard no more
+
+
+@pytest.fixture
+def compiled():
+    """Names of the programs that XLA compiles."""
+    yield from programs_of("backend_compile")
+
+
+@pytest.fixture
+def lowered():
+    """Names of the programs that jax lowers, which no cache of compiled ones spares a process."""
+    yield from programs_of("jaxpr_to_mlir_module")
 
 
 def test_ten_files_of_unequal_length_name_and_unit_are_one_program(compiled):
@@ -64,6 +77,23 @@ def test_what_the_command_says_beside_the_fit_is_compiled_once(compiled):
     compiled.clear()
     assert all(examined(log(n, i)) < 0.1 for i, n in enumerate(LENGTHS) if i)
     assert compiled == []
+
+
+def test_asking_which_options_xla_knows_lowers_one_program(lowered):
+    for known in (programs.quick_options, programs._known, programs._nothing):
+        known.cache_clear()
+    assert [programs.quick_options(level) for level in (0, 1, None)]
+    assert len(lowered) == 1
+
+
+def test_what_friction_is_beside_zero_velocity_is_one_program(lowered):
+    programs.quick_options()
+    term = jf.models.gaussian()
+    form = jax.tree.structure(term), tuple(map(np.shape, jax.tree.leaves(term)))
+    bumps, dry = regression._bumps_and_dry.__wrapped__(*form)
+    assert len(lowered) <= 1
+    assert bumps.shape == dry.shape == (len(term.affine),)
+    assert bumps.any() and (dry[bumps] == 0).all() and (dry > 0).any()
 
 
 def test_a_session_over_recordings_of_any_length_stays_bounded():

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -40,7 +39,8 @@ def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
     form = _renumbered(term, take)
     # Nothing is compiled for a channel that the term does not read.
     read = {name: own for name, own in motion.channels.items() if name in term.coordinates}
-    motion = eqx.tree_at(lambda m: m.channels, motion, read)
+    if len(read) < len(motion.channels):
+        motion = _with_fields(motion, {"channels": read})
     return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
 
 
@@ -89,9 +89,12 @@ def _renumbered(part: Any, number: Callable[[float], Any]) -> Any:
             new = _renumbered(value, number)
             if new is not value:
                 changed[name] = new
-    if not changed:
-        return part
-    other = copy.copy(part)
+    return _with_fields(part, changed) if changed else part
+
+
+def _with_fields(module: Any, changed: dict[str, Any]) -> Any:
+    """A module with other values of some fields, which are neither converted nor checked."""
+    other = copy.copy(module)
     for name, value in changed.items():
         object.__setattr__(other, name, value)
     return other

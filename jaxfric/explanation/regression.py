@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .. import programs
 from ..data.recording import Recording
 from ..terms.base import AbstractTerm, changed_columns, summands
 from ..units import FORCE
@@ -104,7 +105,7 @@ def _bumps_and_dry(form: Any, shapes: tuple[tuple[int, ...], ...]) -> tuple[np.n
     """Of the terms of one form, with leaves of those `shapes`: which columns are bumps, and half
     the difference of the others beside zero velocity, for friction of velocity.
     """
-    parts = summands(jax.tree.unflatten(form, [jnp.ones(shape) for shape in shapes]))
+    parts = summands(jax.tree.unflatten(form, [np.ones(shape) for shape in shapes]))
     bumps = [
         part.coordinates == {"velocity"}
         and each.dimension == FORCE
@@ -112,17 +113,23 @@ def _bumps_and_dry(form: Any, shapes: tuple[tuple[int, ...], ...]) -> tuple[np.n
         for part in parts
         for number, each in enumerate(part.affine)
     ]
-    dry = np.concatenate([_dry(part) for part in parts])
+    slow = np.sqrt(np.finfo(jax.dtypes.canonicalize_dtype(float)).tiny) * np.array([1.0, -1.0])
+    dry = np.round(np.asarray(_half_difference(parts, slow)), 6)
     return np.array(bumps, bool), np.where(bumps, 0.0, dry)
 
 
-def _dry(part: AbstractTerm) -> np.ndarray:
-    if part.coordinates != {"velocity"}:
-        return np.zeros(len(part.affine))
-    none = jnp.zeros(2)
-    slow = np.sqrt(np.finfo(none.dtype).tiny) * jnp.array([1.0, -1.0])
-    forward, backward = np.asarray(part.columns(Recording(none, none, none, slow)))
-    return np.round(0.5 * (forward - backward), 6)
+@programs.compiled
+def _half_difference(parts, velocity):
+    """Half of what a column is at one velocity less at the other; zero for other terms, `(p,)`."""
+    none = jnp.zeros_like(velocity)
+    motion = Recording(none, none, none, velocity)
+    halves = [
+        0.5 * jnp.subtract(*part.columns(motion))
+        if part.coordinates == {"velocity"}
+        else jnp.zeros(len(part.affine))
+        for part in parts
+    ]
+    return jnp.concatenate(halves)
 
 
 class Beside:

@@ -150,7 +150,9 @@ class BlockBootstrap:
         alone = np.trace(lever, axis1=2, axis2=3) > 0.5
         safe = np.where(alone[..., None, None], 0.0, lever)
         matrix = np.eye(lever.shape[2], dtype=lever.dtype) - safe
-        free = np.linalg.solve(matrix, left[..., None])[..., 0]
+        # One column is a division, and most groups have one.
+        one = matrix.shape[-1] == 1
+        free = left / matrix[..., 0] if one else np.linalg.solve(matrix, left[..., None])[..., 0]
         return np.where(alone[:, None], scores, free.transpose(0, 2, 1))
 
     def new_columns(self, raw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
