@@ -831,6 +831,32 @@ def test_force_and_motion_are_aligned_by_the_first_term_before_others_compete(he
     assert found.selection.selected[0].effect.name == "cogging"
 
 
+def test_a_push_is_alone_and_seen_from_begin_to_end():
+    time = 0.01 * np.arange(2000)
+    noise = np.random.default_rng(0).normal(size=time.size)
+
+    def found(*pushes):
+        shape = lambda at: np.cos(np.clip((time - at) / 0.05, -1, 1) * np.pi / 2) ** 2  # noqa: E731
+        values = noise + sum(20.0 * sign * shape(at) for at, sign in pushes)
+        return disturbance_pulses._outstanding(values, time, 0.05, 0.01)
+
+    assert found((5.0, 1), (12.0, -1)) == pytest.approx([5.0, 12.0], abs=0.01)
+    assert found((5.0, 1), (5.2, 1)) == pytest.approx([5.0, 5.2], abs=0.01)
+    # What pushes and at once pulls, and what begins or ends outside the record.
+    assert found((5.0, 1), (5.2, -1), (12.0, -1)) == pytest.approx([12.0], abs=0.01)
+    assert found((0.02, 1), (12.0, -1), (19.98, 1)) == pytest.approx([12.0], abs=0.01)
+
+
+@pytest.mark.parametrize("periods", [0.7, 1.4, 1.9])
+def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):
+    run = healthy[0]
+    time = np.asarray(run.time)
+    duration = float(time[-1] - time[0])
+    slow = 1.5 * np.sin(2 * np.pi * periods * time / duration + 1) + 1.5 * time / duration
+    told = explain(dataclasses.replace(run, force=run.force + slow), "gaussian")
+    assert [f.effect for f in told.findings] == ["load_drift"]
+
+
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
     clock, speed = np.asarray(seen.motion.time), np.asarray(seen.motion.velocity)
@@ -1674,7 +1700,20 @@ def test_a_bump_that_rows_hardly_show_does_not_drive(height):
     columns, bumps = np.stack([side, flank], axis=1), np.array([False, True])
     coulomb, bump = least_squares.bounded(columns, target, bumps, np.array([1.0, 0.0]), 8.0)
     assert coulomb == pytest.approx(5, abs=0.05)
-    assert bump == (pytest.approx(-coulomb) if height < 0 else 8.0)
+    assert bump == pytest.approx(np.sign(height) * coulomb)
+
+
+@pytest.mark.parametrize(("seen", "expected"), [(0.4, 5.0), (0.8, 7.5)])
+def test_a_bump_of_which_rows_see_half_is_as_high_as_they_say(seen, expected):
+    """The dry friction bounds what is extrapolated, and nothing that was seen."""
+    rng = np.random.default_rng(1)
+    side = np.sign(rng.normal(size=400))
+    flank = side * np.linspace(0.0, seen, 400)
+    target = 5 * side + 7.5 * flank + 0.01 * rng.normal(size=400)
+    columns, bumps = np.stack([side, flank], axis=1), np.array([False, True])
+    coulomb, bump = least_squares.bounded(columns, target, bumps, np.array([1.0, 0.0]), 50.0)
+    assert bump == pytest.approx(expected, abs=0.6)
+    assert bool(bump == pytest.approx(coulomb)) == (seen < 0.5)
 
 
 def test_what_a_law_adds_to_dry_friction():

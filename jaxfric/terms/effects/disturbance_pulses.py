@@ -58,8 +58,8 @@ OUTSTANDING = 5.0
 # More pushes than this, or more of the time than that, are no isolated ones.
 MOST, LARGEST_PART = 12, 0.2
 # A push is isolated if there is none of the other sign within its own breadth on either side, two
-# widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of the
-# encoder that come and go in the controller's velocity.
+# widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of
+# the encoder that come and go in the controller's velocity.
 APART = 4
 
 
@@ -121,11 +121,12 @@ def _outstanding(residual, time, width, spacing) -> list[float]:
             return []
         found.append((_summit(time, left, peak), float(np.sign(height[peak]))))
         left[max(0, peak - 2 * reach) : peak + 2 * reach + 1] = 0.0
+    near = APART * (width + 2 * spacing)
     return sorted(
         place
         for place, sign in found
         if time[0] + width <= place <= time[-1] - width
-        and not any(abs(place - at) < APART * (width + 2 * spacing) and sign != other for at, other in found)
+        and not any(abs(place - at) < near and sign != other for at, other in found)
     )
 
 

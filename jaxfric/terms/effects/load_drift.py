@@ -59,7 +59,7 @@ def _horner(coefficients, variable: str) -> str:
     return text
 
 
-# A straight line, a cubic, and as much as follows a wave up to where it is a tone: of k periods over
+# A straight line, a cubic, and as much as follows a wave up to where it is a tone: of k periods in
 # the record, polynomials above the degree πk + 3 have less than a fiftieth.
 DEGREES = (1, 3, 6, int(np.pi * RECURS + 3))
 
