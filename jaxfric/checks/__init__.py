@@ -1,13 +1,11 @@
 """What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
 
+from .design import MATTERS as MATTERS, Design as Design
 from .fitted import (
     LEFT as LEFT,
-    MATTERS as MATTERS,
-    Design as Design,
     Estimated as Estimated,
-    Lateness as Lateness,
     fitted as fitted,
-    lateness as lateness,
+    suspects as suspects,
 )
 from .kinds import (
     KINDS as KINDS,
@@ -17,8 +15,9 @@ from .kinds import (
     places as places,
     remarks as remarks,
 )
+from .lateness import Lateness as Lateness, lateness as lateness, looks as looks
 from .lone import LONE as LONE, lone as lone
-from .recorded import recorded as recorded
+from .recorded import recorded as recorded, recorded_rows as recorded_rows
 from .structure import hides as hides
 
 

@@ -1,21 +1,17 @@
 """Faults that show in what a model leaves of a recording, on the host."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Bool, Float
 
+from .design import HALF, MATTERS, Design
 from .kinds import places
+from .lateness import Lateness, Look, lateness
 
-# What a remark is about changes the force by a twentieth of its size, or it is no matter.
-MATTERS = 0.05
-# It takes half of the power that the model leaves: two parts of a record with parameters of their
-# own take p of J rows' power from noise, which is far less (see ROWS).
-HALF = 0.5
 # Rows for each parameter in either part of a record.
 ROWS = 10
-# Parts of a record that its errors are summed over.
-PARTS = 16
 # Where a record is split.
 SPLITS = tuple(i / 10 for i in range(1, 10))
 # A tenth of the force, a hundredth of its power, is more than any filter or ripple of the log
@@ -23,21 +19,6 @@ SPLITS = tuple(i / 10 for i in range(1, 10))
 LEFT, ROUGH = 0.1, 2.0**0.5
 # Of a quarter of the force everyone wants to know, noise or not.
 LARGE = 0.25
-
-
-class Design(NamedTuple):
-    """The rows of the weak form that a fit is judged by.
-
-    - `columns`: derivatives of the rows by all parameters, affine ones first, `(J, P)`.
-    - `target`: the force, N, and `left`, what the model leaves of it, `(J,)`.
-    - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
-    """
-
-    columns: Float[Array, "J P"]
-    target: Float[Array, " J"]
-    left: Float[Array, " J"]
-    weight: Float[Array, " J"]
-    time: Float[Array, " J"]
 
 
 class Estimated(NamedTuple):
@@ -48,7 +29,29 @@ class Estimated(NamedTuple):
     alpha: Float[np.ndarray, " p"]
     half: Float[np.ndarray, " p"]
     interval: float
-    lateness: "Lateness | None" = None
+    lateness: Lateness | None = None
+
+
+def suspects(
+    designs: Design, force_errors: np.ndarray, looks: Sequence[Look], fits: Sequence[Estimated]
+) -> Bool[np.ndarray, " B"]:
+    """Which fits of a batch [`fitted`][] may find a fault of, by what a few passes show.
+
+    **Arguments:** the `looks` at the designs, and what was estimated from each.
+    """
+    used = np.asarray(designs.weight) > 0
+    target, left = (np.where(used, np.asarray(x), 0.0) for x in (designs.target, designs.left))
+    powers, energies = (np.einsum("bj,bj->b", x, x) for x in (target, left))
+    few = np.count_nonzero(used, axis=1) < ROWS * max(designs.columns.shape[2], 1)
+    plain = (energies <= 0.99 * MATTERS**2 * powers) & (np.asarray(force_errors) <= LEFT)
+    found = few | ~plain | [look.gain for look in looks]
+    for i, fit in enumerate(fits):
+        late = fit.lateness
+        if late is not None and not found[i]:
+            columns = designs.columns[i, used[i]]
+            stamped = bool(_stamped(late, fit, columns, target[i]))
+            found[i] = stamped or late.gain > 0.99 * HALF * energies[i]
+    return found
 
 
 def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> np.ndarray:
@@ -85,10 +88,6 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
     return places(found)
 
 
-# A force that is held acts half a sample after its stamp, and a cycle of the controller later it
-# acts one and a half; what is beyond is another matter. Student's t of 15 degrees of freedom is
-# below 4 in 99.9 % of the cases.
-STAMPED, SURE = 1.5, 4.0
 # By so many intervals a parameter has to be off: to first order, and of the weak form, since closed
 # windows may feel half of it.
 OFF = 2.0
@@ -144,63 +143,6 @@ def _least(columns: np.ndarray, target: np.ndarray) -> float:
     return float(rest @ rest)
 
 
-class Lateness(NamedTuple):
-    """By how much a recorded force is late, s (early below zero): u(t + τ) = u + τ du/dt.
-
-    `error`, s, of the time, by parts of the record; `shift`, by how much each second of it shifts
-    the parameters, `(P,)`; `gain`, the energy, N², that it would remove; `shape`, that of the
-    slope, N²/s².
-    """
-
-    time: float
-    error: float
-    shift: Float[np.ndarray, " P"]
-    gain: float
-    shape: float
-
-    def sure(self, interval: float) -> bool:
-        """Whether it is told from none, and what a hold or a cycle of a controller makes.
-
-        `interval` between the samples, s.
-        """
-        return SURE * self.error < abs(self.time) <= STAMPED * interval
-
-
-def lateness(design: Design, moving: Bool[np.ndarray, " P"] | None = None) -> Lateness | None:
-    """The [`Lateness`][] that the rows of a fit show; `None` where they cannot.
-
-    Of less than a row. What the parameters imitate of it is no part of the estimate.
-
-    **Arguments:** `moving`: the parameters that shift with it, where others are known from what
-    these rows do not hold.
-    """
-    rows = np.flatnonzero(np.asarray(design.weight) > 0)
-    if len(rows) < PARTS:
-        return None
-    end = rows[-1] + 1  # beyond is padding
-    time, whole = (np.asarray(x, float)[:end] for x in (design.time, design.target))
-    columns, left = (np.asarray(x, float)[rows] for x in (design.columns, design.left))
-    if not np.all(np.diff(time) > 0) or not np.isfinite(columns).all():
-        return None
-    slope = np.gradient(whole, time)[rows]
-    size = np.max(np.abs(columns), axis=0)
-    size[size == 0] = 1.0
-    taken = np.linalg.lstsq(columns / size, slope, rcond=1e-10)[0] / size
-    own = slope - columns @ taken
-    power, shape = float(own @ own), float(slope @ slope)
-    if not power > 1e-6 * shape:
-        return None
-    part = float(own @ left)
-    late = -part / power
-    if moving is not None:
-        solved = np.linalg.lstsq((columns / size)[:, moving], slope, rcond=1e-10)[0]
-        taken = np.zeros(len(size))
-        taken[moving] = solved / size[moving]
-    rest = own * (left + late * own)
-    sums = np.add.reduceat(rest, np.arange(PARTS) * len(rows) // PARTS)
-    return Lateness(late, float(np.sqrt(sums @ sums)) / power, -taken, part**2 / power, shape)
-
-
 def _slightly_late(known: Lateness | None, design: Design, energy, power) -> dict[str, float]:
     """A delay of less than a row. Half a sample of it is damping to a light, fast axis."""
     if known is None:
@@ -217,12 +159,13 @@ def _stamped(known: Lateness, fit: Estimated, columns, target) -> dict[str, floa
     """By how much the force acts after its stamp, where a parameter that makes a good part of the
     force is off for it, by a twentieth and by more than its interval.
     """
+    if not known.sure(fit.interval):
+        return {}
     moved = np.abs(known.time * known.shift[: len(fit.alpha)])
-    forces = np.linalg.norm(columns, axis=0)
-    sizes = np.abs(fit.alpha) * forces[: len(fit.alpha)]
+    sizes = np.abs(fit.alpha) * np.linalg.norm(columns[:, : len(fit.alpha)], axis=0)
     large = sizes > PART * np.linalg.norm(target)
     off = large & (moved > OFF * fit.half) & (moved > MATTERS * np.abs(fit.alpha))
-    return {"force_stamped": -known.time} if known.sure(fit.interval) and off.any() else {}
+    return {"force_stamped": -known.time} if off.any() else {}
 
 
 def _late(design: Design, rows, basis, energy, power) -> dict[str, float]:

@@ -11,8 +11,9 @@ PILED = 3.0
 BAND = 0.01
 # Fewer than this share of samples at the end of the range move no parameter by a standard error.
 CLIPPED = 0.005
-# A signal of so few values is known to a thirtieth of its range, friction to a tenth or worse.
-LEVELS = 32
+# A signal of so few values is known to a thirtieth of its range, friction to a tenth or worse. So
+# many samples show them.
+LEVELS, THINNED = 32, 20_000
 # Of a force that is another signal nothing is left but rounding and the noise of a derivative; of
 # a drive's force, with inertia and friction, a good part.
 PROPORTIONAL = 0.01
@@ -38,7 +39,7 @@ def force_faults(
 ) -> dict[str, float]:
     """Faults of the force by itself: levels, spikes, clipping, overflow, held or filled samples."""
     whole, force = np.asarray(recording.force, float), np.asarray(recording.force, float)[valid]
-    levels = len(np.unique(force[:: max(1, len(force) // 20_000)]))
+    levels = len(np.unique(force[:: max(1, len(force) // THINNED)]))
     if levels <= 2:
         return {"force_constant": levels}
     found: dict[str, float] = {}
@@ -128,23 +129,25 @@ def same_as_motion(
     for values in motion.values():
         if (left := _left(force, values)) < PROPORTIONAL:
             return {"force_is_motion": left}
-    gained = _gains(recording, velocity, clock)
-    left = _left(*gained) if len(gained[0]) > PIECE else 1.0
+    gained = np.stack(gains(np.asarray(recording.force, float), velocity, clock.linked))
+    gained = gained[:, np.isfinite(gained).all(axis=0)]
+    left = _left(*gained) if gained.shape[1] > PIECE else 1.0
     return {"force_is_acceleration": left} if left < PROPORTIONAL else {}
 
 
-def _gains(
-    recording: Recording, velocity: np.ndarray, clock: Clock
+def gains(
+    force: np.ndarray, velocity: np.ndarray, linked: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The mean force over short unbroken spans, and what the velocity gains in them: a force that
-    only accelerates is proportional to that, with no derivative taken.
+    """The mean force over short spans, and what the velocity gains in them, `(…, n)` each, of
+    signals `(…, N)`; NaN where a span is broken. A force that only accelerates is proportional to
+    that, with no derivative taken.
     """
-    force, count = np.asarray(recording.force, float), len(velocity) // SPAN
-    whole = np.add.reduceat(~clock.linked, np.arange(0, count * SPAN, SPAN))[:count] == 0
-    ends = np.arange(count)[whole] * SPAN
-    ends = ends[ends + SPAN < len(velocity)]
-    sums = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))])
-    return (sums[ends + SPAN] - sums[ends]) / SPAN, velocity[ends + SPAN] - velocity[ends]
+    count = (force.shape[-1] - 1) // SPAN
+    spans = (*force.shape[:-1], count, SPAN)
+    whole = linked[..., : count * SPAN].reshape(spans).all(axis=-1)
+    middles = (0.5 * (force[..., 1:] + force[..., :-1]))[..., : count * SPAN].reshape(spans)
+    ends = velocity[..., : count * SPAN + 1 : SPAN]
+    return tuple(np.where(whole, x, np.nan) for x in (middles.mean(axis=-1), np.diff(ends)))
 
 
 def _left(force: np.ndarray, values: np.ndarray) -> float:

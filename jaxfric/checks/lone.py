@@ -18,7 +18,7 @@ def lone(values: np.ndarray) -> np.ndarray:
     """Samples that no motion or actuator made: at most three in a row, far beyond all others."""
     size = values - np.median(values)
     np.abs(size, out=size)
-    at = len(size) - 1 - max(LONE, int(RAREST * len(size)))
+    at = len(size) - 1 - beyond_usual(len(size))
     usual = np.partition(size, at)[at]
     far = (size > BEYOND * usual) & (usual > 0)
     ends = np.flatnonzero(np.diff(np.pad(far, 1).astype(np.int8)))
@@ -26,3 +26,8 @@ def lone(values: np.ndarray) -> np.ndarray:
         if last - first > LONE:
             far[first:last] = False
     return far
+
+
+def beyond_usual(count: int) -> int:
+    """How many of so many samples may lie beyond the usual ones."""
+    return max(LONE, int(RAREST * count))

@@ -31,7 +31,7 @@ def faults(
         if given is not None and given > recording.num_samples:
             found[checks.NAMES.index("excerpt")] = recording.num_samples / given
         return found
-    return np.stack([checks.recorded(row_of(host, i), own) for i, own in enumerate(rows)])
+    return checks.recorded_rows(host, rows)
 
 
 def looked_at(
@@ -54,7 +54,9 @@ def checked(
     """
     warnings = np.array(faults, ndmin=2)
     names, batch = found.names[: len(found.model.term.affine)], faults.ndim == 2
-    host = jax.tree.map(np.asarray, (design, recording))
+    designs, logs = jax.tree.map(
+        lambda x: np.asarray(x) if batch else np.asarray(x)[None], (design, recording)
+    )
     alphas, matrices, errors = (
         np.array(x, float, ndmin=n)
         for x, n in ((found.model.alpha, 2), (found.covariance, 3), (found.filtered_force_error, 1))
@@ -62,22 +64,27 @@ def checked(
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     delayed = found.model.force_delay is not None
-    moving = _moving(found, design.columns.shape[-1])
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
-    for i, (alpha, half, error) in enumerate(zip(alphas, halves, errors, strict=True)):
-        own, log = row_of(host, i) if batch else host
-        late, interval = checks.lateness(own, moving), signals.host_interval(log)
-        fit = checks.Estimated(alpha, half, interval, late)
-        fitted = checks.fitted(own, float(error), fit)
+    intervals = signals.host_intervals(logs)
+    looks = checks.looks(designs, _moving(found, designs.columns.shape[-1]))
+    fits = [
+        checks.Estimated(alpha, half, float(interval), look.late)
+        for alpha, half, interval, look in zip(alphas, halves, intervals, looks, strict=True)
+    ]
+    suspect = checks.suspects(designs, errors, looks, fits)
+    for i, ((alpha, half, interval, late), error) in enumerate(zip(fits, errors, strict=True)):
         if late is not None:
             matrices[i] += _by_lateness(late, interval, delayed, len(matrices[i]))
+        if suspect[i]:
+            fitted = checks.fitted(row_of(designs, i), float(error), fits[i])
+            warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
-        if np.isnan(fitted[STRUCTURE]) and checks.hides(
-            own, log.time, log.position, log.mask, alpha, sure
-        ):
-            fitted[STRUCTURE] = error
-        warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
+        told = suspect[i] and not np.isnan(fitted[STRUCTURE])
+        if logs.position is not None and not told:
+            own, log = row_of(designs, i), row_of(logs, i)
+            if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
+                warnings[i, STRUCTURE] = error
         if negative := int(np.sum((alpha + half)[passive] < 0)):
             warnings[i, checks.NAMES.index("negative_parameter")] = negative
     severe = np.array([kind.severe for kind in checks.KINDS])

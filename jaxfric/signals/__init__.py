@@ -6,6 +6,7 @@ from .clock import (
     continuous as continuous,
     host_continuous as host_continuous,
     host_interval as host_interval,
+    host_intervals as host_intervals,
     interval as interval,
     is_traced as is_traced,
     quantile as quantile,

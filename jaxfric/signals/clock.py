@@ -41,15 +41,28 @@ def host_interval(recording: Recording) -> float:
     return float(np.median(steps, overwrite_input=True)) if steps.size else float("nan")
 
 
+def host_intervals(recordings: Recording) -> np.ndarray:
+    """[`host_interval`][] of each row of a batch, `(B,)`."""
+    steps = np.diff(np.asarray(recordings.time, float))
+    known = _linked_on_host(recordings) & ~np.isnan(steps)
+    found, even = np.full(len(steps), np.nan), known.all(axis=1)
+    if even.any() and steps.size:
+        found[even] = np.median(steps[even], axis=1)
+    for row in np.flatnonzero(~even & known.any(axis=1)):
+        found[row] = np.median(steps[row, known[row]])
+    return found
+
+
 def _linked_on_host(recording: Recording) -> np.ndarray:
     mask, segment = np.asarray(recording.mask), np.asarray(recording.segment)
-    return mask[1:] & mask[:-1] & (segment[1:] == segment[:-1])
+    return mask[..., 1:] & mask[..., :-1] & (segment[..., 1:] == segment[..., :-1])
 
 
-def host_continuous(recording: Recording, typical: float) -> np.ndarray:
-    """[`continuous`][] of a recording that is not traced, on the host."""
+def host_continuous(recording: Recording, typical: float | np.ndarray) -> np.ndarray:
+    """[`continuous`][] of a recording that is not traced, or of a batch, on the host."""
     steps = np.diff(np.asarray(recording.time, float))
-    return _linked_on_host(recording) & (steps > 0) & (steps <= GAP_FACTOR * typical)
+    longest = GAP_FACTOR * np.asarray(typical)[..., None]
+    return _linked_on_host(recording) & (steps > 0) & (steps <= longest)
 
 
 def quantile(values: Float[Array, " N"], share: float) -> Float[Array, ""]:

@@ -1,0 +1,26 @@
+"""The rows of the weak form that a fit is judged by."""
+
+from typing import NamedTuple
+
+from jaxtyping import Array, Float
+
+# What a remark is about changes the force by a twentieth of its size, or it is no matter.
+MATTERS = 0.05
+# It takes half of the power that the model leaves: two parts of a record with parameters of their
+# own take p of J rows' power from noise, which is far less (see ROWS).
+HALF = 0.5
+
+
+class Design(NamedTuple):
+    """The rows of the weak form that a fit is judged by.
+
+    - `columns`: derivatives of the rows by all parameters, affine ones first, `(J, P)`.
+    - `target`: the force, N, and `left`, what the model leaves of it, `(J,)`.
+    - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
+    """
+
+    columns: Float[Array, "J P"]
+    target: Float[Array, " J"]
+    left: Float[Array, " J"]
+    weight: Float[Array, " J"]
+    time: Float[Array, " J"]
