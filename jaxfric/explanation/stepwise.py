@@ -1,11 +1,13 @@
 """Stepwise selection: the winner of a contest joins the model, and all terms are refitted."""
 
 import copy
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from functools import partial
+from typing import NamedTuple
 
+from ..terms.effect import Effect
 from .acceptance import LEAST_SHARE, accepted, needed
-from .contest import Finalist, Trial, contest
+from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .intervals import left_out
 from .physical_constraints import constrained, nil
@@ -18,6 +20,16 @@ from .significance import blocks
 
 # More terms than this are no explanation.
 MOST_TERMS = 4
+
+
+class Round(NamedTuple):
+    """A contest for what a fit leaves: its winner, if one is accepted, and the finalists that may not win."""
+
+    contest: Contest
+    current: Fit
+    evidence: Evidence
+    best: Finalist | None
+    spoiling: list[Finalist]
 
 
 def select(
@@ -41,31 +53,42 @@ def select(
         current, selected = begun.last, begun.selected
     evidence, known = with_predictions(problem.evidence, current), len(selected)
     visited, nothing = set[Hashable](), set[Hashable]()
+
+    def among(effect: Effect) -> bool:
+        return in_slip is None or effect.at_reversals
+
+    def round_beside(current: Fit, evidence: Evidence, selected: list[SelectedTerm]) -> Round:
+        least = partial(
+            needed, current=current, evidence=evidence, base=problem.base, selected=selected
+        )
+        found = contest(evidence, current, problem.candidate_set, seed, among, least)
+        there = [f for f in found.finalists if f.trial.candidate.form not in nothing]
+        found = constrained(found._replace(finalists=there), current, evidence)
+        spoiling, allowed = [], []
+        for finalist in found.finalists:
+            spoils = finalist.trial.candidate.form in refused
+            (spoiling if spoils else allowed).append(finalist)
+        found = found._replace(finalists=allowed)
+        best = accepted(found, current, evidence, problem.wide_kernels, problem.base, selected)
+        return Round(found, current, evidence, best, spoiling)
+
     while True:
-        round_ = contest(
-            evidence, current, problem.candidate_set, seed,
-            lambda effect: in_slip is None or effect.at_reversals,
-            partial(needed, current=current, evidence=evidence, base=problem.base,
-                    selected=selected),
-        )  # fmt: skip
-        there = [f for f in round_.finalists if f.trial.candidate.form not in nothing]
-        round_ = constrained(round_._replace(finalists=there), current, evidence)
-        spoiling = [f for f in round_.finalists if f.trial.candidate.form in refused]
-        allowed = [f for f in round_.finalists if f.trial.candidate.form not in refused]
-        round_ = round_._replace(finalists=allowed)
-        best = accepted(round_, current, evidence, problem.wide_kernels, problem.base, selected)
+        own = round_ = round_beside(current, evidence, selected)
+        if own.best is None and in_slip is None and len(selected) + 1 < MOST_TERMS:
+            own = _hidden(round_, selected, round_beside)
         # Two terms that make each other idle would take turns for ever.
         names = *sorted(each.effect.name for each in selected), len(nothing)
-        if best is None or len(selected) >= MOST_TERMS or names in visited:
+        if own.best is None or len(selected) >= MOST_TERMS or names in visited:
             break
         visited.add(names)
         best, rivals, instead = with_rivals(
-            simplest(best, round_), round_, current, evidence, spoiling
+            simplest(own.best, own.contest), own.contest, own.current, own.evidence, own.spoiling
         )
-        current, evidence = joined(best, current, evidence)
+        betas = (*best.betas[: len(current.betas)], best.betas[-1])
+        current, evidence = joined(best._replace(betas=betas), current, evidence)
         trial = with_own_term(best.trial, current)
         selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
-        current, selected = _pruned(evidence, current, selected, round_.size)
+        current, selected = _pruned(evidence, current, selected, round_.contest.size)
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)
             current = without(current, evidence, len(current.terms) - len(selected) + number)
@@ -78,7 +101,35 @@ def select(
         current = fit(current.terms, evidence, betas, 6)
     # Terms that were dropped again leave the base as it was, not as it was refitted on the way.
     last = current if selected else problem.base
-    return Selection(problem.base, last, selected, round_, in_slip=in_slip)
+    return Selection(problem.base, last, selected, round_.contest, in_slip=in_slip)
+
+
+def _hidden(
+    round_: Round,
+    selected: list[SelectedTerm],
+    round_beside: Callable[[Fit, Evidence, list[SelectedTerm]], Round],
+) -> Round:
+    """A round beside the best finalist, of two effects that hide each other; else the round itself.
+
+    What the one leaves is structure, whose flipped signs do as well as the other. Beside each other
+    both have to be accepted: then the round's winner is selected first, and the other one after it.
+    """
+    first = next((f for f in round_.contest.finalists if f.score >= RIVAL), None)
+    if first is None:
+        return round_
+
+    def with_term(finalist: Finalist) -> Round:
+        betas = (*round_.current.betas, finalist.betas[-1])
+        current, evidence = joined(finalist._replace(betas=betas), round_.current, round_.evidence)
+        term = SelectedTerm(with_own_term(finalist.trial, current), (), finalist.p_value)
+        return round_beside(current, evidence, [*selected, term])
+
+    beside = with_term(first)
+    if beside.best is None:
+        return round_
+    again = with_term(beside.best).best
+    both = again is not None and again.effect.name == first.effect.name
+    return beside if both else round_
 
 
 def _started(problem: Problem, in_slip: Selection | None) -> tuple[Fit, list[SelectedTerm]]:
