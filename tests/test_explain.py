@@ -857,6 +857,17 @@ def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):
     assert [f.effect for f in told.findings] == ["load_drift"]
 
 
+def test_two_effects_that_hide_each_other_are_both_found(healthy, monkeypatch):
+    """A step near the end of a record in which the machine warms: neither alone is significant."""
+    warming = terms.ThermalDrift(terms.Coulomb())
+    run = planted(healthy[0], warming, (8.0,), (2.0,))
+    run = planted(run, terms.FrictionStep(terms.Coulomb()), (6.0,), (15.0,))
+    told = explain(run, "gaussian")
+    assert {f.effect for f in told.findings} == {"thermal_drift", "friction_step"}
+    monkeypatch.setattr(stepwise, "_hidden", lambda round_, *_: round_)
+    assert explain(run, "gaussian").verdict == "unexplained"
+
+
 def test_pushes_that_seek_the_reversals_are_no_isolated_ones(healthy):
     seen = evidence.gather(dataclasses.replace(healthy[0], velocity=None))
     clock, speed = np.asarray(seen.motion.time), np.asarray(seen.motion.velocity)

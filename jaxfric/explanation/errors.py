@@ -18,6 +18,7 @@ from .motion import motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .significance import blocks
+from .wording import ELSEWHERE
 
 
 def filtered_errors(findings: Findings, first: Fit) -> dict[str, Any]:
@@ -66,7 +67,8 @@ def document(better: Improved, filtered: dict, model: Model, figures: Figures) -
 def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     """What the model leaves of the held-out recording with values of its own, and which these are.
 
-    Listed are values of the baseline's terms that differ by more than both recordings leave open.
+    Listed are values of the baseline's terms that differ by more than both recordings leave open,
+    unless this recording is left with as little by them: then it does not determine them.
     """
     problem, selection = findings.undelayed
     if problem.held is None:
@@ -74,11 +76,23 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     carried = verification.carried(selection.last, problem.held, selection.rephased)
     again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
     model = findings.model(findings.with_late(again))
+    known = selection.given is None and _left_by(findings.undelayed, again) > ELSEWHERE * (
+        verification.error(selection.last, problem.evidence)
+    )
     return {
         "error": figures.held(model),
         "filtered": verification.error(again, problem.held),
-        "values": {} if findings.selection.given else _differing(findings.undelayed, again),
+        "values": _differing(findings.undelayed, again) if known else {},
     }
+
+
+def _left_by(solution: Solution, again: Fit) -> float:
+    """What is left of this recording's force, relative, with the first term of another fit."""
+    evidence, last = solution.problem.evidence, solution.selection.last
+    seen = with_predictions(evidence, last)
+    other = seen.columns(last.terms[0], again.betas[0][None])[0] @ again.alphas[0]
+    left = last.residual + last.part(0) - other
+    return float(np.linalg.norm(left) / max(np.linalg.norm(evidence.force), 1e-300))
 
 
 def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:

@@ -23,7 +23,10 @@ MOST_TERMS = 4
 
 
 class Round(NamedTuple):
-    """A contest for what a fit leaves: its winner, if one is accepted, and the finalists that may not win."""
+    """A contest for what the fit `current` leaves, its accepted winner, if any, as `best`.
+
+    `spoiling`: finalists that may not win, as beside the rows the model with them is worse.
+    """
 
     contest: Contest
     current: Fit
