@@ -63,7 +63,7 @@ KINDS = (
         False,
         "The velocity column is {value:.3g} s late beside the position, as by a filter or a cycle, "
         "so that friction would change its sign at the wrong time. It is taken earlier by whole "
-        "samples.",
+        "samples, and what the filter took off it is added from the position.",
     ),
     Kind(
         "velocity_shifted",

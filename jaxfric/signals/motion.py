@@ -28,7 +28,7 @@ SLIP_DEVIATIONS = 4.0
 def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
-    A recorded velocity is kept; one that is late beside the position is taken earlier. Else the
+    A recorded velocity is kept; one that is late beside the position is corrected. Else the
     velocity is the zero-phase smoothing derivative of the position, by the local polynomial that
     [`choose`][jaxfric.signals.choose] finds most accurate or by the one that is given; inside
     `jax.jit` by local parabolas, whose widths reach less far, and a recorded velocity is kept.

@@ -51,7 +51,7 @@ class Prepared:
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
     def __init__(self, recording: Recording):
-        self._recorded = recording  # whose noise is that of a velocity taken earlier too
+        self._recorded = recording  # whose noise is that of a late velocity, corrected, too
         self._derived = recording.velocity is None
         self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
         if self._derived and not signals.is_traced(recording):
