@@ -134,8 +134,8 @@ def read_csv(path: Path) -> Table:
 def _blocks(path: Path) -> Iterator[bytes]:
     """The lines of a file, some megabytes at once."""
     with path.open("rb") as file:
-        while lines := file.readlines(_BLOCK):
-            yield b"".join(lines)
+        while block := file.read(_BLOCK):
+            yield block + file.readline()
 
 
 def _holds(path: Path, character: bytes) -> bool:
