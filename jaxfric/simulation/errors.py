@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import equinox as eqx
 import jax
@@ -16,7 +16,7 @@ from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
-from .prediction import Prepared, at_once, force, later, samples_of, with_channels
+from .prediction import Prepared, at_once, forces, later, samples_of, with_channels
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
@@ -154,10 +154,22 @@ def residual(
     `prepared`: the recording made [`uniform`][jaxfric.data.recording] and prepared, where that has
     been done.
     """
+    left = np.empty(recording.num_samples)
+    for own, part in _residuals(model, recording, prepared):
+        left[own] = part
+    return left
+
+
+def _residuals(
+    model: Model, recording: Recording, prepared: Prepared | None
+) -> Iterator[tuple[slice, Float[np.ndarray, " n"]]]:
+    """[`residual`][] of samples one after the other, and which these are."""
     require_model(model, "predict")
     motion = Prepared.of(recording) if prepared is None else prepared
-    predicted = np.array(force(model, motion), float)[: recording.num_samples]
-    return np.subtract(arrived(model, recording), predicted, out=predicted)
+    force = arrived(model, recording)
+    for own, predicted in forces(model, motion):
+        measured = force[own]  # without what the motion is padded with
+        yield own, measured - np.asarray(predicted, float)[: measured.size]
 
 
 def arrived(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
@@ -175,7 +187,10 @@ def force_error(model: Model, recording: Recording) -> float:
     """
     prepared = Prepared.of(recording)
     moving = in_motion(recording, delay_of(model), prepared)
-    return relative(residual(model, recording, prepared), arrived(model, recording), moving)
+    parts = _residuals(model, recording, prepared)
+    left = sum(power(part, moving[own]) for own, part in parts)
+    size = power(arrived(model, recording), moving)
+    return math.sqrt(left / size) if size > 0 else float("nan")
 
 
 def relative(

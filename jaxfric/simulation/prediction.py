@@ -40,7 +40,8 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     """
     require_model(model, "predict")
     require(recording, "predict")
-    return jnp.asarray(force(model, Prepared(recording)))
+    first, *others = (force for _, force in forces(model, Prepared(recording)))
+    return jnp.asarray(np.concatenate([first, *others]) if others else first)
 
 
 class Prepared:
@@ -135,19 +136,21 @@ class Prepared:
         return dataclasses.replace(excerpt(self.recorded), velocity=np.concatenate(velocity))
 
 
-def force(model: Model, motion: Prepared) -> Float[Array, " N"] | np.ndarray:
-    """What [`predict`][] gives, N, `(N,)`: of a long recording in pieces, but of a model whose
-    force at a sample is not that of the motion around it.
+def forces(
+    model: Model, motion: Prepared
+) -> Iterator[tuple[slice, Float[Array, " n"] | np.ndarray]]:
+    """What [`predict`][] gives, N, of samples one after the other, and which these are: all at once
+    but of a long recording, and a model whose force at a sample follows from the motion around it.
     """
     recorded = motion.recorded
-    if signals.is_traced(recorded) or recorded.num_samples <= MOST or not _by_samples(model):
-        return force_along(model, motion)
+    count = recorded.num_samples
+    if signals.is_traced(recorded) or count <= MOST or not _by_samples(model):
+        yield slice(0, count), force_along(model, motion)
+        return
     delay = at_once(model)[1]
     reach = motion.choice.reach + samples_of(0.0 if delay is None else float(delay), motion.step)
-    values = np.empty(recorded.num_samples, recorded.time.dtype)
     for own, part, inside in motion.pieces(reach):
-        values[own] = np.asarray(force_along(model, part))[inside]
-    return values
+        yield own, np.asarray(force_along(model, part))[inside]
 
 
 def samples_of(delay: float, step: float) -> int:
@@ -156,7 +159,7 @@ def samples_of(delay: float, step: float) -> int:
 
 
 def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
-    """The same at once."""
+    """What [`predict`][] gives, N, `(N,)`, of a recording that is prepared."""
     model, delay = at_once(model)
     prepared = dataclasses.replace(with_channels(model, motion.recording), units=())
     momentum: Callable[[Recording], Array | np.ndarray] = partial(_momentum_of, model)
