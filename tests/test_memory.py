@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric import signals
 from jaxfric.data import writing
 from jaxfric.data.excerpt import MOST, PIECES, excerpt
 from jaxfric.data.recording import pad
 from jaxfric.models import from_parameters
-from jaxfric.signals import derivatives
-from jaxfric.simulation import prediction
+from jaxfric.signals import HALF_WIDTHS, derivatives
+from jaxfric.simulation import errors, prediction
 
 
 def written(path, count):
@@ -62,15 +63,37 @@ def test_a_derivative_in_pieces_is_that_of_the_whole(tmp_path, monkeypatch, half
     np.testing.assert_allclose(pieces, whole, rtol=1e-9, atol=1e-12)
 
 
-def test_a_force_in_blocks_is_that_of_the_whole(tmp_path, monkeypatch):
-    recording = jf.read(written(tmp_path / "log.npz", 20_000))
+def broken(recording):
+    """The same with invalid samples, and a segment that begins at one that no piece begins at."""
+    mask, segment = np.asarray(recording.mask).copy(), np.zeros(recording.num_samples, np.int32)
+    mask[5000:5100], segment[13_001:] = False, 1
+    return dataclasses.replace(recording, mask=mask, segment=segment, num_segments=2)
+
+
+@pytest.mark.parametrize("delay", [None, 0.0123])
+@pytest.mark.parametrize("ripple", [0.0, 1e-3])
+def test_force_and_force_error_in_pieces_are_those_of_the_whole(
+    tmp_path, monkeypatch, ripple, delay
+):
+    """Without a ripple the derivative reaches so far that samples are averaged in blocks first."""
+    recording = broken(jf.read(written(tmp_path / "log.npz", 60_000)))
+    more = ripple * np.sin(2 * np.pi * 7 * np.asarray(recording.time))
+    recording = dataclasses.replace(recording, position=np.asarray(recording.position) + more)
     names = {"coulomb": 20.0, "viscous": 60.0, "stribeck_force": 3.0, "stribeck_velocity": 0.01}
     values = {name + sign: v for name, v in names.items() for sign in "+-"} | {"inertia": 5.0}
     model = from_parameters(jf.models.gaussian(), values)
-    whole = np.asarray(jf.predict(model, recording))
-    monkeypatch.setattr(prediction, "MOST", 3000)
-    monkeypatch.setattr(prediction, "BLOCK", 4096)
-    np.testing.assert_array_equal(np.asarray(jf.predict(model, recording)), whole)
+    model = dataclasses.replace(model, force_delay=delay)
+    width = signals.choose(recording).half_width
+    assert (width > HALF_WIDTHS[-1]) == (ripple == 0)
+    whole, error = np.asarray(jf.predict(model, recording)), errors.force_error(model, recording)
+    moving = errors.in_motion(recording, delay or 0.0)
+    for module in (prediction, errors):
+        monkeypatch.setattr(module, "MOST", 6000)
+    monkeypatch.setattr(prediction, "BLOCK", 8192)
+    pieces = np.asarray(jf.predict(model, recording))
+    np.testing.assert_allclose(pieces, whole, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(errors.in_motion(recording, delay or 0.0), moving)
+    np.testing.assert_allclose(errors.force_error(model, recording), error, rtol=1e-9)
 
 
 def traced(path):
@@ -100,10 +123,10 @@ def resident(*arguments):
 
 
 @pytest.mark.slow
-def test_identify_takes_a_hundred_bytes_by_the_row(tmp_path):
+def test_identify_takes_sixty_bytes_by_the_row(tmp_path):
     """Of the rows beyond those that are fitted; it was 900."""
     small, large = (written(tmp_path / f"{n}.npz", n) for n in (500_000, 2_500_000))
-    assert (resident("identify", large) - resident("identify", small)) / 2_000_000 < 120
+    assert (resident("identify", large) - resident("identify", small)) / 2_000_000 < 60
 
 
 def test_a_table_written_in_parts_is_whole(tmp_path, monkeypatch):

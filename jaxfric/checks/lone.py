@@ -16,10 +16,13 @@ CYCLE = 16
 
 def lone(values: np.ndarray) -> np.ndarray:
     """Samples that no motion or actuator made: at most three in a row, far beyond all others."""
-    size = values - np.median(values)
+    middle = np.median(values)
+    size = values - middle
     np.abs(size, out=size)
     at = len(size) - 1 - beyond_usual(len(size))
-    usual = np.partition(size, at)[at]
+    size.partition(at)  # in place: of a long recording each copy counts
+    usual = size[at]
+    np.abs(np.subtract(values, middle, out=size), out=size)
     far = (size > BEYOND * usual) & (usual > 0)
     ends = np.flatnonzero(np.diff(np.pad(far, 1).astype(np.int8)))
     for first, last in zip(ends[::2], ends[1::2], strict=True):

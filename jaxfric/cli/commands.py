@@ -267,7 +267,7 @@ def predict(arguments: Namespace) -> int:
         columns["arrived_force"] = acting
         limit = f"{float(model.force_limit):.5g} {dict(model.units)['force']}"
         notes = [*notes, f"The measured force counts up to the model's force limit, {limit}."]
-    error = relative(left[moving], acting[moving])
+    error = relative(left, acting, moving)
     share = f"{error:.2%}" if np.isfinite(error) else "undefined: no slip, or no force"
     columns["in_motion"] = moving.astype(int)
     notes = [stated(recording), *notes]

@@ -134,8 +134,8 @@ def read_csv(path: Path) -> Table:
 def _blocks(path: Path) -> Iterator[bytes]:
     """The lines of a file, some megabytes at once."""
     with path.open("rb") as file:
-        while lines := file.readlines(_BLOCK):
-            yield b"".join(lines)
+        while block := file.read(_BLOCK):
+            yield block + file.readline()
 
 
 def _holds(path: Path, character: bytes) -> bool:
@@ -165,15 +165,18 @@ def _arrow_csv(path: Path, dialect: _Dialect) -> Table | None:
         from pyarrow import csv as arrow_csv
     except ImportError:
         return None
+    options = (
+        arrow_csv.ReadOptions(skip_rows=dialect.first, column_names=dialect.header),
+        arrow_csv.ParseOptions(delimiter=dialect.delimiter),
+        arrow_csv.ConvertOptions(decimal_point=dialect.decimal),
+    )
+    most = sum(block.count(b"\n") for block in _blocks(path)) + 1
     try:
-        columns = arrow_columns(
-            arrow_csv.read_csv(
-                path,
-                arrow_csv.ReadOptions(skip_rows=dialect.first, column_names=dialect.header),
-                arrow_csv.ParseOptions(delimiter=dialect.delimiter),
-                arrow_csv.ConvertOptions(decimal_point=dialect.decimal),
-            )
-        )
+        try:
+            # By the types of the first block, so that no text has to be kept for other ones.
+            columns = _joined(arrow_csv.open_csv(path, *options), most)
+        except pa.ArrowInvalid:
+            columns = _joined(arrow_csv.read_csv(path, *options).to_batches(), most)
     except pa.ArrowInvalid:
         return None
     return Table(columns, dialect.first + 1, [])
@@ -325,16 +328,19 @@ def numbers(column: np.ndarray, name: str, path: Path, first_row: int) -> np.nda
     return result
 
 
-def arrow_columns(table: Any) -> dict[str, np.ndarray]:
-    """The columns of an Arrow table by name, each let go of once it is an array."""
-    import pyarrow as pa
-
-    columns = {}
-    for name in table.column_names:
-        columns[name] = arrow_column(table.column(0))
-        table = table.remove_column(0)
-        pa.default_memory_pool().release_unused()
-    return columns
+def _joined(batches: Iterable[Any], most: int) -> dict[str, np.ndarray]:
+    """The columns of Arrow's batches by name, of `most` rows together at most."""
+    columns, count = dict[str, np.ndarray](), 0
+    for batch in batches:
+        for name, part in zip(batch.schema.names, map(arrow_column, batch.columns), strict=True):
+            known = columns.get(name, part)
+            kind = np.result_type(known, part)
+            if name not in columns or known.dtype != kind:
+                columns[name] = np.empty(most, kind)
+                columns[name][:count] = known[:count]
+            columns[name][count : count + len(part)] = part
+        count += batch.num_rows
+    return {name: column[:count] for name, column in columns.items()}
 
 
 def arrow_column(column: Any) -> np.ndarray:
@@ -343,13 +349,13 @@ def arrow_column(column: Any) -> np.ndarray:
 
     kind = column.type
     if pa.types.is_integer(kind) and column.null_count == 0:
-        return column.to_numpy()
+        return column.to_numpy(zero_copy_only=False)
     if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
-        return column.cast(pa.float64()).to_numpy()
+        return column.cast(pa.float64()).to_numpy(zero_copy_only=False)
     if pa.types.is_boolean(kind):
-        return column.cast(pa.int8()).cast(pa.float64()).to_numpy()
+        return column.cast(pa.int8()).cast(pa.float64()).to_numpy(zero_copy_only=False)
     if pa.types.is_timestamp(kind):
-        return column.to_numpy()
+        return column.to_numpy(zero_copy_only=False)
     if pa.types.is_null(kind):
         return np.full(len(column), np.nan)
     return np.array(column.to_pylist(), dtype=object)

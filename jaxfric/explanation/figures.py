@@ -7,10 +7,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model
-from ..simulation.errors import delay_of, in_motion, relative, residual, unseen
+from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
 from ..simulation.prediction import Prepared
 
 # Parts of a record that are compared: none shares more than its ends with another.
@@ -68,9 +69,13 @@ class Figures:
         key = *self._key(model, where), delay
         if key not in self._errors:
             moving, force = self._samples(where, delay)
-            left = self._left(model, where)[moving]
-            parts = np.array([float(part @ part) for part in np.array_split(left, PARTS)])
-            self._errors[key] = relative(left, force[moving]), parts
+            left, count = self._left(model, where), np.cumsum(moving, dtype=np.int32)
+            share, more = divmod(int(count[-1]), PARTS)  # as evenly as they divide
+            before = [part * share + min(part, more) for part in range(1, PARTS)]
+            starts = [0, *np.searchsorted(count, before, "right").tolist(), len(left)]
+            spans = map(slice, starts[:-1], starts[1:])
+            parts = np.array([power(left[span], moving[span]) for span in spans])
+            self._errors[key] = relative(left, force, moving), parts
         return self._errors[key]
 
     def as_seen(self, model: Model) -> Model:
@@ -126,13 +131,19 @@ class Figures:
         """
         recording = self._recordings["here"]
         moving, force = self._samples("here", delay_of(model))
-        rest = self._left(model, "here")
         steps = np.diff(np.asarray(recording.time, float)[moving])
-        steps = steps[steps > 0]
-        count = max(1, round(lag / float(np.median(steps)))) if steps.size else 1
-        apart = np.abs(rest[count:] - rest[:-count])[moving[count:] & moving[:-count]]
-        if not apart.size:
+        steps = some(steps, steps > 0)
+        count = 1
+        if steps.size:
+            count = max(1, round(lag / float(np.median(steps, overwrite_input=True))))
+        del steps
+        rest = self._left(model, "here")
+        both = moving[count:] & moving[:-count]
+        if not both.any():
             return float("nan")
-        noise = float(np.median(apart)) / 0.6745 / np.sqrt(2)
-        alone = relative(np.full(int(moving.sum()), noise), force[moving])
-        return min(alone, relative(rest[moving], force[moving]))  # noise is no more than all of it
+        apart = some(rest[count:], both) - some(rest[:-count], both)
+        np.abs(apart, out=apart)
+        noise = float(np.median(apart, overwrite_input=True)) / 0.6745 / np.sqrt(2)
+        total = power(force, moving)
+        alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
+        return min(alone, relative(rest, force, moving))  # noise is no more than all of it

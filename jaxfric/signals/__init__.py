@@ -11,7 +11,7 @@ from .clock import (
     is_traced as is_traced,
     quantile as quantile,
 )
-from .derivatives import derivative as derivative
+from .derivatives import derivative as derivative, part_of as part_of
 from .kernels import (
     kernel as kernel,
     kernel_slope as kernel_slope,

@@ -36,7 +36,8 @@ def _linked(recording: Recording) -> Bool[Array, " M"]:
 def host_interval(recording: Recording) -> float:
     """[`interval`][] of a recording that is not traced, on the host; NaN without valid steps."""
     steps = np.diff(np.asarray(recording.time, float))
-    known = _linked_on_host(recording) & ~np.isnan(steps)
+    known = _linked_on_host(recording)
+    known &= ~np.isnan(steps)
     steps = steps if known.all() else steps[known]
     return float(np.median(steps, overwrite_input=True)) if steps.size else float("nan")
 

@@ -17,6 +17,7 @@ def derivative(
     half_width: int,
     degree: int = DEGREES[0],
     order: int = 1,
+    step: float | None = None,
 ) -> np.ndarray:
     """Zero-phase smoothing derivative of a signal by local polynomials, shape `(N,)`.
 
@@ -24,15 +25,32 @@ def derivative(
     half-width, weighted by (1 − τ²)⁴. Where the clock is even that is a convolution.
 
     **Arguments:** `signal`, `(N,)`; `half_width`, in samples of the typical interval; `degree` of
-    the polynomial; `order`, 1 or 2.
+    the polynomial; `order`, 1 or 2; `step`, the typical interval, s, by default
+    the recording's.
 
     **Returns:** the signal's unit per s (per s²); zero where too few samples are near.
     """
-    log = SampledSignal.of(recording, signal)
+    log = SampledSignal.of(recording, signal, step)
     block = next((b for b in (1, *BLOCKS) if half_width <= b * HALF_WIDTHS[-1]), BLOCKS[-1])
     if block == 1:
         return _piecewise(log, half_width, degree, order)
     return _in_blocks(log, block, half_width, degree, order)
+
+
+def part_of(recording: Recording, own: slice, reach: int) -> slice:
+    """The samples `own` of a recording and as many on either side, of which the derivatives are
+    those of the whole: what is averaged in blocks is so from the start of each segment.
+    """
+    stop, first = min(own.stop + reach, recording.num_samples), own.start - reach + BLOCKS[-1]
+    if first <= 0:
+        return slice(0, stop)
+    mask, segment = np.asarray(recording.mask), np.asarray(recording.segment)
+    begins = int(np.searchsorted(segment, segment[first]))
+    over = np.count_nonzero(mask[begins:first]) % BLOCKS[-1]
+    while over:
+        first -= 1
+        over -= int(mask[first])
+    return slice(first, stop)
 
 
 def _piecewise(log: SampledSignal, half_width: int, degree: int, order: int) -> np.ndarray:

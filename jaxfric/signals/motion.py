@@ -25,7 +25,9 @@ SLIP_SHARE = 0.006
 SLIP_DEVIATIONS = 4.0
 
 
-def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
+def prepare(
+    recording: Recording, choice: Choice | None = None, step: float | None = None
+) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
     A recorded velocity is kept; one that is late beside the position is corrected. Else the
@@ -33,6 +35,7 @@ def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
     [`choose`][jaxfric.signals.choose] finds most accurate or by the one that is given; inside
     `jax.jit` by local parabolas, whose widths reach less far, and a recorded velocity is kept.
     Samples that are not finite but valid by their mask stay: `identify` reports them.
+    `step`: the typical interval, s, where it is known.
     """
     recording = with_timely_velocity(recording)
     if recording.velocity is not None:
@@ -44,7 +47,7 @@ def prepare(recording: Recording, choice: Choice | None = None) -> Recording:
         return dataclasses.replace(recording, velocity=velocity)
     choice = choose(recording) if choice is None else choice
     position = np.asarray(recording.position)
-    slope = derivative(recording, position, choice.half_width, choice.degree)
+    slope = derivative(recording, position, choice.half_width, choice.degree, step=step)
     usable = np.isfinite(position) | ~np.asarray(recording.mask)
     derived = np.where(usable, slope, np.nan).astype(position.dtype, copy=False)
     return dataclasses.replace(recording, velocity=derived)

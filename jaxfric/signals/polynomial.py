@@ -29,6 +29,11 @@ class Choice(NamedTuple):
     bias: float = float("nan")
     noise: float = float("nan")
 
+    @property
+    def reach(self) -> int:
+        """So many samples on either side decide on the derivative, blocks of them included."""
+        return self.half_width + 4 * BLOCKS[-1]
+
 
 def weights(half_width: float, degree: int, order: int = 1, reach: int | None = None) -> np.ndarray:
     """Weights of the derivative at the middle of an even clock of one second, `(2 reach + 1,)`.

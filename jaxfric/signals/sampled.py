@@ -37,11 +37,12 @@ class SampledSignal(NamedTuple):
     longest: int
 
     @classmethod
-    def of(cls, recording: Recording, signal) -> Self:
-        """A signal of a recording, `(N,)`."""
+    def of(cls, recording: Recording, signal, step: float | None = None) -> Self:
+        """A signal of a recording, `(N,)`; `step`, the typical interval, s, where it is known."""
         time, segment = np.asarray(recording.time, float), np.asarray(recording.segment)
         signal, valid = np.asarray(signal, float), np.asarray(recording.mask)
-        return cls.on(time, signal, valid, segment, host_interval(recording))
+        step = host_interval(recording) if step is None else step
+        return cls.on(time, signal, valid, segment, step)
 
     @classmethod
     def on(cls, time, signal, valid, segment, step: float) -> Self:

@@ -1,19 +1,22 @@
 """How far a model's force is from the recorded one, and over which samples that is told."""
 
 import dataclasses
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Iterator, Sequence
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from .. import checks, signals
-from ..data.excerpt import excerpt
+from ..data.cleaning.pieces import some
+from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..identification.projections import WeakForm
 from ..models import Model, require as require_model, weighed
-from .prediction import Prepared, at_once, force_along, later, with_channels
+from .prediction import Prepared, at_once, forces, later, samples_of, with_channels
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
@@ -26,7 +29,7 @@ def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
     valid = valid & np.isfinite(force)
     found = np.zeros_like(valid)
     if np.count_nonzero(valid) > 2 * checks.LONE:
-        found[valid] = checks.lone(force[valid])
+        found[valid] = checks.lone(some(force, valid))
     return found
 
 
@@ -43,24 +46,32 @@ def in_motion(
     one side, and is that of a few samples. `prepared`: as in [`residual`][].
     """
     motion = Prepared.of(recording) if prepared is None else prepared
-    slowest = float(signals.host_scales(excerpt(motion.recording))[0].slowest)
-    velocity = np.asarray(motion.recording.velocity)[: recording.num_samples]
-    moving = np.abs(velocity) > slowest
-    valid = np.asarray(motion.recording.mask)[: recording.num_samples]
+    side, valid, ends = _course(motion, recording.num_samples)
+    moving = np.abs(side) == 1
     width = motion.choice.half_width
-    turns = _turns(np.sign(velocity) * moving, valid)
-    moving &= valid & ~_beside([(turns, width), (_ends(motion, valid), width // 2)], moving & valid)
+    moving &= valid & ~_beside([(_turns(side, valid), width), (ends, width // 2)], moving & valid)
+    del side, valid
     if delay:
-        moving &= np.asarray(later(recording, jnp.asarray(moving, float), delay)) == 1
-        moving &= _within(recording, delay)
+        moving &= _so_much_later(recording, moving, delay, motion.step)
     return moving & ~outliers(recording)
 
 
-def _within(recording: Recording, delay: float) -> Bool[np.ndarray, " N"]:
-    """Whether the motion that much later is in the recording: at its end it is not."""
-    time = jnp.asarray(recording.time)
-    shift = np.asarray(later(recording, time, delay) - time)
-    return np.abs(shift - delay) < 0.5 * float(signals.host_interval(recording))
+def _so_much_later(
+    recording: Recording, moving: Bool[np.ndarray, " N"], delay: float, step: float
+) -> Bool[np.ndarray, " N"]:
+    """Whether the axis is moving that much later, and that is in the recording: beyond its end it
+    is not. `step`: the typical interval, s.
+    """
+    found, reach = np.zeros_like(moving), samples_of(delay, step)
+    for start in range(0, moving.size, MOST):
+        first, stop = max(0, start - reach), min(start + MOST, moving.size)
+        near = slice(first, stop + reach)
+        part = jax.tree.map(lambda x, near=near: x[near], recording)
+        time = jnp.asarray(part.time)
+        late = np.asarray(later(part, jnp.asarray(moving[near], float), delay)) == 1
+        late &= np.abs(np.asarray(later(part, time, delay) - time) - delay) < 0.5 * step
+        found[start:stop] = late[start - first : stop - first]
+    return found
 
 
 # Of both sides of a stop, a reversal or an end: the last sample before it and the first behind it.
@@ -69,23 +80,36 @@ Sides = tuple[np.ndarray, np.ndarray]
 MOSTLY = 0.5
 
 
-def _turns(side: Float[np.ndarray, " N"], valid: Bool[np.ndarray, " N"]) -> Sides:
+def _course(motion: Prepared, count: int) -> tuple[np.ndarray, np.ndarray, Sides]:
+    """The direction of motion of so many samples, 0 at rest and 2 where it is not known, `(N,)`;
+    which are valid, `(N,)`; and both sides of every end of the recording and of every gap in it.
+    """
+    slowest = float(signals.host_scales(motion.excerpt())[0].slowest)
+    side, valid, apart = np.zeros(count, np.int8), np.zeros(count, bool), list[np.ndarray]()
+    for own, part, inside in motion.pieces(1):
+        velocity = np.asarray(part.recording.velocity)[inside][: count - own.start]
+        known = slice(own.start, own.start + velocity.size)
+        way = np.sign(velocity) * (np.abs(velocity) > slowest)
+        side[known] = np.where(np.isnan(velocity), 2, way)
+        valid[known] = np.asarray(part.recording.mask)[inside][: velocity.size]
+        linked = signals.host_continuous(part.recording, motion.step)[inside]
+        apart.append(own.start + np.flatnonzero(~linked[: velocity.size]))
+    last = np.concatenate(apart)
+    last = last[last < count - 1]
+    return side, valid, (np.append(last, count - 1), np.insert(last + 1, 0, 0))
+
+
+def _turns(side: Int[np.ndarray, " N"], valid: Bool[np.ndarray, " N"]) -> Sides:
     """Both sides of every stop and reversal.
 
     **Arguments:** `side`, the direction of motion, 0 at rest, `(N,)`; `valid` samples, which alone
     have one.
     """
+    changes = np.flatnonzero(np.diff(some(side, valid)))
+    if valid.all():
+        return changes, changes + 1
     known = np.flatnonzero(valid)
-    changes = np.flatnonzero(np.diff(side[known]))
     return known[changes], known[changes + 1]
-
-
-def _ends(motion: Prepared, valid: Bool[np.ndarray, " N"]) -> Sides:
-    """Both sides of every end of the recording and of every gap in it."""
-    recording = motion.recording
-    linked = signals.host_continuous(recording, signals.host_interval(recording))
-    apart = np.flatnonzero(~linked[: valid.size - 1])
-    return np.append(apart, valid.size - 1), np.insert(apart + 1, 0, 0)
 
 
 def _beside(
@@ -96,11 +120,11 @@ def _beside(
     """
     near = np.zeros_like(moving)
     for (lasts, firsts), reach in edges:
-        beside = np.zeros(moving.size + 1, int)  # so many more edges are near from here on
+        beside = np.zeros(moving.size + 1, np.int32)  # so many more edges are near from here on
         for first in (lasts + 1 - reach, firsts):
             np.add.at(beside, np.maximum(first, 0), 1)
             np.add.at(beside, np.minimum(first + reach, moving.size), -1)
-        more = near | (np.cumsum(beside[:-1]) > 0)
+        more = near | (np.cumsum(beside, dtype=np.int32, out=beside)[:-1] > 0)
         if np.count_nonzero(more & moving) < MOSTLY * np.count_nonzero(moving):
             near = more
     return near
@@ -130,10 +154,22 @@ def residual(
     `prepared`: the recording made [`uniform`][jaxfric.data.recording] and prepared, where that has
     been done.
     """
+    left = np.empty(recording.num_samples)
+    for own, part in _residuals(model, recording, prepared):
+        left[own] = part
+    return left
+
+
+def _residuals(
+    model: Model, recording: Recording, prepared: Prepared | None
+) -> Iterator[tuple[slice, Float[np.ndarray, " n"]]]:
+    """[`residual`][] of samples one after the other, and which these are."""
     require_model(model, "predict")
     motion = Prepared.of(recording) if prepared is None else prepared
-    predicted = np.asarray(force_along(model, motion), float)[: recording.num_samples]
-    return arrived(model, recording) - predicted
+    force = arrived(model, recording)
+    for own, predicted in forces(model, motion):
+        measured = force[own]  # without what the motion is padded with
+        yield own, measured - np.asarray(predicted, float)[: measured.size]
 
 
 def arrived(model: Model, recording: Recording) -> Float[np.ndarray, " N"]:
@@ -151,15 +187,25 @@ def force_error(model: Model, recording: Recording) -> float:
     """
     prepared = Prepared.of(recording)
     moving = in_motion(recording, delay_of(model), prepared)
-    left = residual(model, recording, prepared)[moving]
-    del prepared
-    return relative(left, arrived(model, recording)[moving])
+    parts = _residuals(model, recording, prepared)
+    left = sum(power(part, moving[own]) for own, part in parts)
+    size = power(arrived(model, recording), moving)
+    return math.sqrt(left / size) if size > 0 else float("nan")
 
 
-def relative(left: Float[np.ndarray, " M"], force: Float[np.ndarray, " M"]) -> float:
-    """norm(left)/norm(force); NaN where there is no force."""
-    size = float(np.linalg.norm(force))
-    return float(np.linalg.norm(left)) / size if size > 0 else float("nan")
+def relative(
+    left: Float[np.ndarray, " N"], force: Float[np.ndarray, " N"], chosen: Bool[np.ndarray, " N"]
+) -> float:
+    """norm(left)/norm(force) of the chosen samples; NaN where there is no force."""
+    size = power(force, chosen)
+    return math.sqrt(power(left, chosen) / size) if size > 0 else float("nan")
+
+
+def power(values: Float[np.ndarray, " N"], chosen: Bool[np.ndarray, " N"]) -> float:
+    """The square sum of the chosen values; of a long recording a copy of them counts."""
+    pieces = (slice(start, start + MOST) for start in range(0, len(values), MOST))
+    parts = (values[piece][chosen[piece]] for piece in pieces)
+    return float(sum(part @ part for part in parts))
 
 
 def relative_error(

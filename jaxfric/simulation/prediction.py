@@ -1,6 +1,7 @@
 """Backward in time, as it were: the force that a recorded motion needs."""
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 from functools import cached_property, partial
 from typing import TypeGuard
@@ -11,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .. import programs, signals
-from ..data.excerpt import MOST
+from ..data.excerpt import MOST, SPARE, excerpt, pieces
 from ..data.recording import Recording, pad, require, uniform
 from ..models import Model, require as require_model, weighed
 from ..terms.actuator import PREDICTED, REACTION, carried
@@ -19,8 +20,10 @@ from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
 from ..terms.presliding import AbstractStates, starts
 
-# So many samples are predicted together.
+# Of a long recording so many samples are predicted together, with those on either side.
 BLOCK = 1 << 16
+# A clock that runs so many times as fast as it typically does is none.
+FASTEST = 4
 
 
 def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
@@ -37,7 +40,8 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     """
     require_model(model, "predict")
     require(recording, "predict")
-    return jnp.asarray(force_along(model, Prepared(recording)))
+    first, *others = (force for _, force in forces(model, Prepared(recording)))
+    return jnp.asarray(np.concatenate([first, *others]) if others else first)
 
 
 class Prepared:
@@ -50,13 +54,28 @@ class Prepared:
         """
         return cls(uniform(recording) if recording.num_samples <= MOST else recording)
 
-    def __init__(self, recording: Recording):
-        self._recorded = recording  # whose noise is that of a late velocity, corrected, too
+    def __init__(self, recording: Recording, whole: "Prepared | None" = None):
+        self.recorded = recording  # whose noise is that of a late velocity, corrected, too
+        self._whole = whole  # of which it is a part
         self._derived = recording.velocity is None
         self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
         if self._derived and not signals.is_traced(recording):
-            self._slope = signals.choose(recording)
-        self.recording = signals.prepare(recording, self._slope)
+            self._slope = signals.choose(recording) if whole is None else whole._slope
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The recording with its velocity."""
+        if self._whole is not None and not self._derived:
+            return self.recorded
+        return signals.prepare(self.recorded, self._slope, self.step)
+
+    @cached_property
+    def step(self) -> float | None:
+        """The typical interval, s; `None` inside jit."""
+        if self._whole is not None:
+            return self._whole.step
+        traced = signals.is_traced(self.recorded)
+        return None if traced else signals.host_interval(self.recorded)
 
     @cached_property
     def choices(self) -> tuple[signals.Choice | None, ...]:
@@ -74,10 +93,69 @@ class Prepared:
         That which is best for a recorded velocity; for a derived one the wider of those that are
         best for the first and the second derivative of the position.
         """
+        if self._whole is not None:
+            return self._whole.choice
         if self._slope is None:
-            return signals.choose(self._recorded, self._recorded.velocity)
-        both = self._slope, signals.choose(self.recording, order=2)
+            return signals.choose(self.recorded, self.recorded.velocity)
+        both = self._slope, signals.choose(self.recorded, order=2)
         return max(both, key=lambda each: each.half_width)
+
+    @property
+    def _reach(self) -> int:
+        """From how many samples on either side a velocity that is derived follows."""
+        return 0 if self._slope is None else self._slope.reach
+
+    def around(self, own: slice, reach: int = 0) -> tuple["Prepared", slice]:
+        """A part of it that has the velocity of the whole in the samples `own` and in `reach` more
+        on either side, of one of few lengths; and where in it those are.
+        """
+        source = self.recorded if self._derived else self.recording
+        part = signals.part_of(source, own, reach + self._reach)
+        some = jax.tree.map(lambda x: np.asarray(x)[part], source)
+        some = uniform(pad(some, max(BLOCK, some.num_samples)))
+        return Prepared(some, self), slice(own.start - part.start, own.stop - part.start)
+
+    def pieces(self, reach: int = 0) -> Iterator[tuple[slice, "Prepared", slice]]:
+        """Samples one after the other, with what [`around`][] gives; all at once where few."""
+        count = self.recorded.num_samples
+        if count <= MOST:
+            yield slice(0, count), self, slice(0, count)
+            return
+        beside = 2 * (reach + self._reach)
+        length = max(BLOCK - beside, beside)
+        for start in range(0, count, length):
+            own = slice(start, min(start + length, count))
+            yield own, *self.around(own, reach)
+
+    def excerpt(self) -> Recording:
+        """The [`excerpt`][jaxfric.data.excerpt] of it."""
+        if not self._derived or self.recorded.num_samples <= SPARE * MOST:
+            return excerpt(self.recording)
+        parts = [self.around(own) for own in pieces(np.asarray(self.recorded.mask))]
+        velocity = [np.asarray(part.recording.velocity)[own] for part, own in parts]
+        return dataclasses.replace(excerpt(self.recorded), velocity=np.concatenate(velocity))
+
+
+def forces(
+    model: Model, motion: Prepared
+) -> Iterator[tuple[slice, Float[Array, " n"] | np.ndarray]]:
+    """What [`predict`][] gives, N, of samples one after the other, and which these are: all at once
+    but of a long recording, and a model whose force at a sample follows from the motion around it.
+    """
+    recorded = motion.recorded
+    count = recorded.num_samples
+    if signals.is_traced(recorded) or count <= MOST or not _by_samples(model):
+        yield slice(0, count), force_along(model, motion)
+        return
+    delay = at_once(model)[1]
+    reach = motion.choice.reach + samples_of(0.0 if delay is None else float(delay), motion.step)
+    for own, part, inside in motion.pieces(reach):
+        yield own, np.asarray(force_along(model, part))[inside]
+
+
+def samples_of(delay: float, step: float) -> int:
+    """How many samples a delay, s, is at most; `step`, the typical interval, s."""
+    return math.ceil(FASTEST * abs(delay) / step)
 
 
 def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
@@ -92,11 +170,9 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
         # speed: as much as the force has had.
         lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
         momentum = partial(_momentum_of, model.only(lambda term: not _late(term)))
-    if prepared.num_samples > MOST and not signals.is_traced(prepared) and _by_samples(model):
-        momentum, force = (partial(_in_blocks, of) for of in (momentum, force))
-    elif any(map(_stepped, summands(model.term))):
+    if any(map(_stepped, summands(model.term))):
         force = partial(_with_smooth_pushes, model, motion)
-    rate = _rate(momentum(prepared), prepared, motion.choices[-1])
+    rate = _rate(momentum(prepared), prepared, motion.choices[-1], motion.step)
     return later(prepared, force(prepared) + rate + lagging, delay)
 
 
@@ -153,13 +229,16 @@ def _smoothed(signal: Float[Array, " N"], prepared: Recording, motion: Prepared)
     between = jnp.where(starts(prepared), 0.0, jnp.diff(prepared.time, prepend=prepared.time[:1]))
     for choice in motion.choices:
         mean = 0.5 * (signal + jnp.concatenate([signal[:1], signal[:-1]]))
-        signal = _rate(jnp.cumsum(mean * between), prepared, choice)
+        signal = _rate(jnp.cumsum(mean * between), prepared, choice, motion.step)
     return signal
 
 
 def _by_samples(model: Model) -> bool:
-    """Whether the model has no memory: its force at a sample follows from that sample alone."""
-    return model.bristles is None and all(isinstance(p, AbstractLaw) for p in _parts(model.term))
+    """Whether the force at a sample follows from the motion at it: the model has no memory, and
+    its terms read no force that it predicts.
+    """
+    laws = all(isinstance(part, AbstractLaw) for part in _parts(model.term))
+    return laws and model.bristles is None and not model.term.coordinates & {PREDICTED, REACTION}
 
 
 def _parts(term: AbstractTerm) -> Iterator[AbstractTerm]:
@@ -171,18 +250,10 @@ def _parts(term: AbstractTerm) -> Iterator[AbstractTerm]:
             yield part
 
 
-def _in_blocks(of: Callable[[Recording], Array], recording: Recording) -> np.ndarray:
-    """A function of each sample of a long recording, `(N,)`: its columns at once would be large."""
-    count = recording.num_samples
-    values = np.empty(count, recording.time.dtype)
-    for start in range(0, count, BLOCK):
-        stop = min(start + BLOCK, count)
-        part = jax.tree.map(lambda x, own=slice(start, stop): np.asarray(x)[own], recording)
-        values[start:stop] = np.asarray(of(pad(part, BLOCK)))[: stop - start]
-    return values
-
-
-def _rate(momentum: Float[Array, " N"], prepared: Recording, choice: signals.Choice | None):
+def _rate(
+    momentum: Float[Array, " N"], prepared: Recording, choice: signals.Choice | None,
+    step: float | None,
+):  # fmt: skip
     """The zero-phase smoothing derivative of the momentum, `(N,)`; inside jit by parabolas."""
     traced = signals.is_traced(prepared) or isinstance(momentum, jax.core.Tracer)
     if traced or choice is None:
@@ -192,7 +263,7 @@ def _rate(momentum: Float[Array, " N"], prepared: Recording, choice: signals.Cho
         width = jax.lax.stop_gradient(signals.choose_half_width(motion, signals.TRACED_REACH))
         span = (width + 0.5) * signals.interval(prepared)
         return signals.local_quadratic(prepared, momentum, span, signals.TRACED_REACH)[1]
-    rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree)
+    rate = signals.derivative(prepared, momentum, choice.half_width, choice.degree, step=step)
     return rate.astype(momentum.dtype, copy=False)
 
 
@@ -219,6 +290,9 @@ def later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Arra
 def _shifted(time, segment, signal, delay):
     steps = jnp.where(segment[1:] == segment[:-1], jnp.diff(time), 0.0)
     elapsed = jnp.concatenate([jnp.zeros(1, time.dtype), jnp.cumsum(jnp.maximum(steps, 0.0))])
+    # What a recording is padded with has the time of its last sample, which holds.
+    own = jnp.append(True, (steps > 0) | (segment[1:] != segment[:-1]))
+    signal = signal[jax.lax.cummax(jnp.where(own, jnp.arange(time.size), 0))]
     # Segments far enough apart that none reaches the next one.
     apart = elapsed + segment.astype(time.dtype) * (elapsed[-1] + 1)
     ends = jnp.searchsorted(segment, segment, side="right") - 1
