@@ -10,25 +10,21 @@ from ..looks.text import Block, Table
 from ..units import POSITION, VELOCITY, spell
 from .cleaning.pieces import some
 
-# So many steps of a long recording's clock are added up at once.
-PIECE = 1 << 18
-
 
 def facts(recording: Any, notes: Sequence[str] = ()) -> dict[str, Any]:
     """File, samples, duration (s), mean sample rate (Hz) of a `Recording`, and what was tidied."""
     mask = np.asarray(recording.mask)
     time, segment = (some(np.asarray(x), mask) for x in (recording.time, recording.segment))
-    inside = segment[1:] == segment[:-1]
-    starts = range(0, len(inside), PIECE)
-    spans = (slice(start, start + PIECE + 1) for start in starts)
-    parts = [np.sum(some(np.diff(time[span]), inside[span][:PIECE])) for span in spans]
-    count, duration = int(np.count_nonzero(inside)), float(np.sum(parts))
+    changes = np.flatnonzero(segment[1:] != segment[:-1])
+    first, last = np.append(0, changes + 1), np.append(changes, time.size - 1)
+    first, last = first[: time.size], last[: time.size]
+    count, duration = time.size - first.size, float(np.sum(time[last] - time[first]))
     return {
         "file": recording.source,
         "sha256": recording.sha256 or None,
         "samples": int(mask.size),
         "used": int(np.count_nonzero(mask)),
-        "segments": int(np.unique(segment[np.append(True, ~inside)]).size),
+        "segments": int(np.unique(segment[first]).size),
         "duration": duration,
         "sample_rate": count / duration if count else None,
         "notes": list(notes),
