@@ -92,7 +92,7 @@ def _left_by(solution: Solution, again: Fit) -> float:
     seen = with_predictions(evidence, last)
     other = seen.columns(last.terms[0], again.betas[0][None])[0] @ again.alphas[0]
     left = last.residual + last.part(0) - other
-    return float(np.linalg.norm(left) / max(np.linalg.norm(evidence.force), 1e-300))
+    return float(np.linalg.norm(left)) / max(float(np.linalg.norm(evidence.force)), 1e-300)
 
 
 def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:

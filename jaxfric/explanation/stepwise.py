@@ -67,10 +67,8 @@ def select(
         found = contest(evidence, current, problem.candidate_set, seed, among, least)
         there = [f for f in found.finalists if f.trial.candidate.form not in nothing]
         found = constrained(found._replace(finalists=there), current, evidence)
-        spoiling, allowed = [], []
-        for finalist in found.finalists:
-            spoils = finalist.trial.candidate.form in refused
-            (spoiling if spoils else allowed).append(finalist)
+        spoiling = [f for f in found.finalists if f.trial.candidate.form in refused]
+        allowed = [f for f in found.finalists if f.trial.candidate.form not in refused]
         found = found._replace(finalists=allowed)
         best = accepted(found, current, evidence, problem.wide_kernels, problem.base, selected)
         return Round(found, current, evidence, best, spoiling)
