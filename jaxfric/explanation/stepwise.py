@@ -25,7 +25,8 @@ MOST_TERMS = 4
 class Round(NamedTuple):
     """A contest for what the fit `current` leaves, its accepted winner, if any, as `best`.
 
-    `spoiling`: finalists that may not win, as beside the rows the model with them is worse.
+    `spoiling`: finalists that may not win, as beside the rows the model with them is worse;
+    `strong`: the best of the others that lacks nothing but significance.
     """
 
     contest: Contest
@@ -33,6 +34,7 @@ class Round(NamedTuple):
     evidence: Evidence
     best: Finalist | None
     spoiling: list[Finalist]
+    strong: Finalist | None
 
 
 def select(
@@ -71,7 +73,9 @@ def select(
         allowed = [f for f in found.finalists if f.trial.candidate.form not in refused]
         found = found._replace(finalists=allowed)
         best = accepted(found, current, evidence, problem.wide_kernels, problem.base, selected)
-        return Round(found, current, evidence, best, spoiling)
+        enough = (f for f in allowed if current.energy - f.energy >= least(f.trial))
+        strong = next((f for f in enough if f.score >= RIVAL), None)
+        return Round(found, current, evidence, best, spoiling, strong)
 
     while True:
         own = round_ = round_beside(current, evidence, selected)
@@ -110,12 +114,12 @@ def _hidden(
     selected: list[SelectedTerm],
     round_beside: Callable[[Fit, Evidence, list[SelectedTerm]], Round],
 ) -> Round:
-    """A round beside the best finalist, of two effects that hide each other; else the round itself.
+    """A round beside its strong finalist, of two effects that hide each other; else the same round.
 
     What the one leaves is structure, whose flipped signs do as well as the other. Beside each other
     both have to be accepted: then the round's winner is selected first, and the other one after it.
     """
-    first = next((f for f in round_.contest.finalists if f.score >= RIVAL), None)
+    first = round_.strong
     if first is None:
         return round_
 
