@@ -116,8 +116,8 @@ def with_timely_velocity(recording: Recording) -> Recording:
 
     Taken earlier by whole samples, and added to it the derivative of what the position says more:
     what is slow enough for that derivative comes from the position, which no filter has made
-    smaller, and what is too fast for it stays as it was recorded (a complementary filter; Brown &
-    Hwang, 4th ed. 2012, section 8.9). As it is inside `jax.jit`, where the values are not known.
+    smaller, and what is too fast for it stays as it was recorded (a complementary filter; Higgins
+    1975). As it is inside `jax.jit`, where the values are not known.
     """
     # Of a long recording a part says it, in bounded time and memory.
     if is_traced(recording) or (lag := lag_of_velocity(excerpt(recording))) == 0:
