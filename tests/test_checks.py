@@ -210,6 +210,18 @@ def test_noise_alone_is_no_fault_of_a_fit(noise):
         assert found.keys() <= ({"large_error"} if noise > 1 else set())
 
 
+def test_noise_is_no_gain_where_each_direction_has_its_parameters():
+    for seed in range(20):
+        time, columns, left = rows(seed, noise=0.3)
+        forward = columns[:, :1] > 0
+        columns = np.where(forward, 1, 0) * columns, np.where(forward, 0, 1) * columns
+        columns = np.concatenate([each[:, :2] for each in columns], axis=1)
+        force = columns @ [5.0, 3.0, 5.0, 3.0] + left
+        # A force of a thousandth less noise, as where rows of another kernel were fitted.
+        design = Design(columns, force, 0.999 * left, np.ones(len(time)), time)
+        assert np.isnan(checks.fitted(design, 0.05)).all()
+
+
 def test_a_change_in_the_middle_and_a_late_force_are_told_with_their_time():
     time, columns, noise = rows()
     before, after = columns @ [5.0, 3.0, 2.0], columns @ [8.0, 3.0, 2.0]

@@ -317,12 +317,12 @@ quickly = functools.partial(jax.jit, compiler_options=quick_options())
 
 
 def tall(kind, rows=6000):
-    """Columns long enough for the quick way, some of which it must leave to Gram-Schmidt."""
+    """Columns some of which products of columns alone do not tell apart."""
     speed = np.random.default_rng(2).uniform(0.1, 0.101 if kind == "narrow" else 1.0, rows)
     columns = [np.ones(rows), speed, np.exp(-((speed / 0.2) ** 2)), np.zeros(rows)]
     if kind == "spanned":
         columns[3] = 3 * columns[0] - 2e-5 * columns[1]
-    elif kind == "hidden":  # from every row that is looked at first
+    elif kind == "hidden":
         columns[3] = np.where(np.arange(rows) == 7, 1.0, 0.0)
     elif kind == "close":
         columns[3] = columns[2] + 1e-9 * speed**3
@@ -330,14 +330,27 @@ def tall(kind, rows=6000):
     return jnp.asarray(np.stack(columns, axis=1) * scales)
 
 
+def gram_schmidt(columns):
+    """The orthonormal basis, column by column, in more digits than the other way has."""
+    rest = np.array(columns, np.longdouble).T
+    for i, column in enumerate(rest):
+        for _ in range(2):
+            column -= rest[:i].T @ (rest[:i] @ column)
+        size = np.sqrt(column @ column)
+        spanned = size <= 100 * np.finfo(float).eps * np.linalg.norm(columns[:, i])
+        rest[i] = 0.0 if spanned else column / size
+    return rest.T.astype(float)
+
+
 @pytest.mark.parametrize("kind", ["plain", "narrow", "spanned", "hidden", "close"])
-def test_tall_columns_are_orthonormalised_as_by_gram_schmidt(kind):
-    columns = tall(kind)
-    basis, slow = quickly(reduced.orthonormal)(columns), reduced.gram_schmidt(columns)[0]
+@pytest.mark.parametrize("rows", [600, 6000])
+def test_columns_are_orthonormalised_as_by_gram_schmidt(kind, rows):
+    columns = tall(kind, rows)
+    basis, slow = quickly(reduced.orthonormal)(columns), gram_schmidt(columns)
     own = np.ones(4) if kind in ("hidden", "close") else np.array([1.0, 1.0, 1.0, 0.0])
     np.testing.assert_allclose(basis.T @ basis, np.diag(own), atol=1e-13)
     # A direction is known as well as what is left of its column: a narrow range leaves 1e-6.
-    np.testing.assert_allclose(basis.T @ slow, np.diag(own), atol=1e-8)
+    np.testing.assert_allclose(basis.T @ slow, np.diag(own), atol=1e-7)
     target = columns @ jnp.asarray([1e6, 2.0, 3e-6, 0.0]) + 1e-3
     alpha = quickly(reduced.least_squares)(columns, target)
     np.testing.assert_allclose(columns.T @ (target - columns @ alpha) / 1e6, 0.0, atol=1e-6)
@@ -345,20 +358,17 @@ def test_tall_columns_are_orthonormalised_as_by_gram_schmidt(kind):
         assert alpha[3] == 0
 
 
-@pytest.mark.slow
-def test_derivatives_of_a_tall_least_squares_are_those_of_a_short_one():
-    columns, few = tall("plain"), tall("plain", 600)
-    tiled = jnp.tile(few, (10, 1))
-    force = jnp.asarray(np.random.default_rng(3).normal(size=600))
+@pytest.mark.parametrize("kind", ["plain", "spanned"])
+def test_derivatives_of_a_basis_are_those_of_the_fit(kind):
+    columns, few = tall(kind), np.random.default_rng(3)
+    target, turn = few.normal(size=len(columns)), jnp.asarray(few.normal(size=columns.shape))
+    turn = turn.at[:, 3].set(0.0 if kind == "spanned" else turn[:, 3])
 
-    def total(scale, columns, force):
-        bent = columns * (1 + scale * columns[:, 1:2])
-        return jnp.sum(reduced.least_squares(bent, force) * jnp.asarray([1e-6, 1.0, 1e6, 0.0]))
+    def explained(step):
+        changed = columns * (1 + step * turn)
+        changed = changed.at[:, 3].set(changed[:, 0]) if kind == "spanned" else changed
+        return jnp.sum((reduced.orthonormal(changed).T @ target) ** 2)
 
-    assert columns.shape[0] >= reduced.TALL > few.shape[0]
-    for order in (jax.grad, lambda f: jax.jacfwd(jax.jacfwd(f))):
-        tall_, short = (
-            jax.jit(order(total))(0.3, c, f)
-            for c, f in ((tiled, jnp.tile(force, 10)), (few, force))
-        )
-        np.testing.assert_allclose(tall_, short, rtol=1e-8)
+    slope = jax.jit(jax.grad(explained))(0.0)
+    ends = [float(jax.jit(explained)(x)) for x in (-1e-4, 1e-4)]
+    np.testing.assert_allclose(slope, (ends[1] - ends[0]) / 2e-4, rtol=1e-4)

@@ -101,9 +101,10 @@ ONE_SIGN = 0.01
 def _gain(basis, target, left) -> dict[str, float]:
     """The gain of the positive force, where one of its own leaves half of the residual.
 
-    Noise alone never gives half: what of it is in the positive force is half of it at most.
+    Of the force that the model gives: the measured one holds its own noise, which where each
+    direction has parameters of its own is all that they leave of it.
     """
-    positive = np.maximum(target, 0.0)
+    positive = np.maximum(target - left, 0.0)
     powers = float(positive @ positive), float(target @ target)
     if not ONE_SIGN * powers[1] < powers[0] < (1 - ONE_SIGN) * powers[1]:
         return {}

@@ -88,7 +88,7 @@ def _looks(designs: Design, moving) -> list[Look]:
     columns, used, designs = columns[index], used[index], Design(*(x[index] for x in designs))
     slope = np.where(used, _slopes(designs, last[index]), 0.0)
     target, left = (np.where(used, x, 0.0) for x in (designs.target, designs.left))
-    positive = np.maximum(target, 0.0)
+    positive = np.maximum(target - left, 0.0)
     size = np.max(np.abs(columns), axis=1)
     size[size == 0] = 1.0
     values = np.stack([slope, positive], axis=2)

@@ -34,10 +34,10 @@ def solve(term, beta, recording, rows: Rows, alpha=None):
         return alpha, columns, target - columns @ alpha
 
     def by_beta(beta):
-        return rows.columns(term.with_beta(beta), recording) @ jax.lax.stop_gradient(alpha)
+        return rows.force(term.with_beta(beta), jax.lax.stop_gradient(alpha), recording)
 
     jacobian = jnp.concatenate([columns, jax.jacfwd(by_beta)(beta)], axis=1)
-    return alpha, jacobian, target - columns @ alpha
+    return alpha, jacobian, target - jacobian[:, : alpha.size] @ alpha
 
 
 class Solved(NamedTuple):

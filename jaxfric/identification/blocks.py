@@ -210,7 +210,7 @@ def gained(
     gram = rest.T @ rest
     # Columns that are nearly one are made two by rounding: of those the second counts for little.
     gram = gram * (1 + 1e4 * eps * jnp.eye(gram.shape[0], dtype=gram.dtype))
-    white, _ = small.whiten(gram)
+    white = small.whiten(gram)
     return jnp.sum((white.T @ (rest.T @ target)) ** 2)
 
 

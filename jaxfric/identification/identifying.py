@@ -18,7 +18,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
-from . import alignment, assessment, reduced
+from . import alignment, assessment
 from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
@@ -139,13 +139,12 @@ def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identi
     return jax.lax.map(one, recording, batch_size=_together(*recording.time.shape))
 
 
-def _together(count: int, samples: int) -> int | None:
-    """How many rows of so many samples go at once; `None` for one by one."""
+def _together(count: int, samples: int) -> int:
+    """How many rows of so many samples go at once."""
     if jax.default_backend() != "cpu":
         return max(1, min(SAMPLES // samples, count))
-    # Small batches: a refinement loop under vmap makes every row wait for the slowest. Long rows
-    # one by one, so that of the ways of `reduced.orthonormal` each goes one, not both.
-    return None if samples >= reduced.TALL else min(8, count)
+    # Small batches: a refinement loop under vmap makes every row wait for the slowest.
+    return min(8, count)
 
 
 solve_rows = programs.compiled(_solve_rows)

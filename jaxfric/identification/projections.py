@@ -78,6 +78,13 @@ class Rows(eqx.Module):
         momentum = term.momentum(recording) if term.inertial else None
         return self.project(term.columns(recording), momentum)
 
+    def force(
+        self, term: AbstractTerm, alpha: Float[Array, " p"], recording: Recording
+    ) -> Float[Array, " J"]:
+        """The rows of a term's force, N, less its known part; `alpha`: its affine parameters."""
+        momentum = (term.momentum(recording) @ alpha)[:, None] if term.inertial else None
+        return self.project((term.columns(recording) @ alpha)[:, None], momentum)[:, 0]
+
     def offset(self, term: AbstractTerm, recording: Recording) -> Float[Array, " J"]:
         """The rows of a term's known part f0, `(J,)`."""
         return self.project(term.offset(recording)[:, None])[:, 0]
@@ -313,11 +320,12 @@ class WeakForm(AbstractProjection):
         """The rows of a prepared recording; weighted where the kernel lies wholly inside slip."""
         filter_ = make_filter(recording, scales.interval, self.half_width)
         velocity, reach = recording.velocity, self.half_width
-        breaks = jnp.pad(jnp.cumsum(~continuous(recording, scales.interval)), (1, 0))
+        broken = ~continuous(recording, scales.interval)
+        breaks = jnp.pad(jnp.cumsum(broken, dtype=jnp.int32), (1, 0))
         whole = filter_.gather(breaks, reach) == filter_.gather(breaks, -reach)
 
         def within(slips):
-            stops = jnp.cumsum(~slips)
+            stops = jnp.cumsum(~slips, dtype=jnp.int32)
             before = filter_.gather(stops - (~slips).astype(stops.dtype), -reach)
             return whole & (filter_.gather(stops, reach) == before)
 

@@ -19,13 +19,12 @@ from . import small
 # A tile of grid points times samples stays below this many numbers, so that it lives in the cache
 # and the memory does not grow with the grid: 2¹⁷ doubles are 1 MiB.
 TILE = 2**17
+# Rows of a few columns that stay in the cache while they are multiplied.
+PIECE = 2**13
 # Places at which a bump is looked at to see what of it is constant or straight.
 PLACES = 512
-# From so many rows on, fewer passes over them are worth the PLACES rows' own Gram-Schmidt.
-TALL = 8 * PLACES
-# The least share of a column, squared, that the ones before it must leave for an orthonormal basis
-# by products to be exact to ten times the rounding.
-NEAR = 0.1
+# What the columns before it leave of a column is rounding up to so many times the last digit.
+ROUNDING = 100
 # Points for one, two, three, … nonlinear parameters: a ratio of 100 between the ends is then
 # stepped by under 4 %, resp. 7 %, finer than a bump's own relative width.
 GRID_POINTS = (128, 64, 24, 12, 8)
@@ -57,37 +56,17 @@ def orthonormal(columns: Float[Array, "J p"]) -> Float[Array, "J p"]:
     return basis_of(columns).orthonormal()
 
 
-def gram_schmidt(columns: Float[Array, "J p"]) -> tuple[Float[Array, "J p"], Float[Array, "p p"]]:
-    """The basis as by [`orthonormal`][], and the matrix that makes it out of the columns.
-
-    Classical Gram-Schmidt, repeated for rounding (Golub & Van Loan, 4th ed. 2013, section 5.2.7).
-    """
-
-    def append(state, item):
-        basis, matrix = state
-        column, place = item
-        rest, made = column, place
-        for _ in range(2):
-            share = basis.T @ rest
-            rest, made = rest - basis @ share, made - matrix @ share
-        # Zero where the rest is but rounding beside the column.
-        square, size = jnp.sum(rest**2), root(jnp.sum(column**2))
-        new = square > (100 * jnp.finfo(rest.dtype).eps * size) ** 2
-        scale = jnp.where(new, 1 / jnp.sqrt(jnp.where(new, square, 1.0)), 0.0)
-        basis = basis + scale * rest[:, None] * place[None, :]
-        return (basis, matrix + scale * made[:, None] * place[None, :]), None
-
-    places = jnp.eye(columns.shape[1], dtype=columns.dtype)
-    empty = jnp.zeros_like(columns), jnp.zeros_like(places)
-    return jax.lax.scan(append, empty, (columns.T, places))[0]
-
-
 class Basis(eqx.Module):
     """An orthonormal basis Q = A M of columns A, as A `first` = `near` and Q = `near` `white`."""
 
     near: Float[Array, "J p"]
     first: Float[Array, "p p"]
     white: Float[Array, "p p"]
+
+    @property
+    def matrix(self) -> Float[Array, "p p"]:
+        """M."""
+        return self.first @ self.white
 
     def orthonormal(self) -> Float[Array, "J p"]:
         """Q."""
@@ -99,36 +78,47 @@ class Basis(eqx.Module):
 
     def divide(self, vector: Float[Array, " p"]) -> Float[Array, " p"]:
         """(AᵀA)⁻¹ = M Mᵀ times a vector."""
-        matrix = self.first @ self.white
-        return matrix @ (matrix.T @ vector)
+        return self.matrix @ (self.matrix.T @ vector)
 
 
 def basis_of(columns: Float[Array, "J p"]) -> Basis:
-    """The basis of [`gram_schmidt`][], of tall columns in a quicker way where that is as exact.
+    """The basis of [`orthonormal`][], by a Cholesky QR that is done twice.
 
-    Gram-Schmidt on some of the rows makes the columns nearly orthonormal on all of them, and what
-    is left to do to those loses nothing in the product QᵀQ (a Cholesky QR with a preconditioner;
-    Fukaya et al. 2020).
+    The first makes the columns nearly orthonormal; what its products lose of a column that is
+    nearly spanned the second finds, since there that column is large (Fukaya et al. 2020).
     """
     if columns.shape[1] == 1:
         square = jnp.sum(columns**2)
         there = square > 0
         scale = jnp.where(there, 1 / jnp.sqrt(jnp.where(there, square, 1.0)), 0.0)
         return Basis(columns, jnp.ones((1, 1), columns.dtype), scale[None, None])
-
-    def slow():
-        basis, matrix = gram_schmidt(columns)
-        return Basis(basis, matrix, jnp.eye(columns.shape[1], dtype=columns.dtype))
-
-    if columns.shape[0] < TALL:
-        return slow()
-    some = jax.lax.stop_gradient(columns[:: columns.shape[0] // PLACES])
-    first = gram_schmidt(some)[1]
-    # What the few rows do not tell from the columns before it is left as it is.
-    first = first + jnp.diag(jnp.where(jnp.diagonal(first) > 0, 0.0, 1.0).astype(first.dtype))
+    first, pivots = nearly(columns)
     near = columns @ first
-    white, pivot = small.whiten(near.T @ near)
-    return jax.lax.cond(pivot > NEAR, lambda: Basis(near, first, white), slow)
+    return Basis(near, first, whiten_again(near.T @ near, pivots))
+
+
+def nearly(columns: Float[Array, "J p"]) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
+    """A matrix that makes columns nearly orthonormal, and the pivots it counts with, `(p,)`."""
+    columns = jax.lax.stop_gradient(columns)
+    return nearly_white(columns.T @ columns)
+
+
+def nearly_white(gram: Float[Array, "p p"]) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
+    """As [`nearly`][], from the products of the columns.
+
+    Any matrix serves that is near enough: the derivatives of this one are left out.
+    """
+    return small.nearly_white(gram, 10 * float(jnp.finfo(gram.dtype).eps))
+
+
+def whiten_again(gram: Float[Array, "p p"], pivots: Float[Array, " p"]) -> Float[Array, "p p"]:
+    """The matrix that makes columns orthonormal which [`nearly`][] are, from their products.
+
+    Zero for a column whose rest is but rounding beside the column as it was.
+    """
+    size = jnp.diagonal(gram) * pivots
+    least = (ROUNDING * jnp.finfo(gram.dtype).eps) ** 2
+    return small.whiten(gram, jax.lax.stop_gradient(least / jnp.where(size > 0, size, 1.0)))
 
 
 def project_out(basis: Float[Array, "J q"], values: Float[Array, "J k"]) -> Float[Array, "J k"]:
@@ -254,10 +244,10 @@ def moments(
     together = root(jnp.sum(roots[:, place] ** 2, axis=0))
     signed = columns if parity is None else columns * parity[:, None]
     some = together[:, None] * signed[place]
-    dual, matrix = gram_schmidt(some)
+    basis = basis_of(some)
     # The functions whose values at these places are the orthonormal ones.
-    function = signed @ matrix
-    dual = dual * together[:, None]
+    function = signed @ basis.matrix
+    dual = basis.orthonormal() * together[:, None]
     against = jnp.concatenate([jnp.swapaxes(bases, 1, 2), left[:, None, :]], axis=1)
     against = against * roots[:, None, :]
     if parity is not None:
@@ -328,6 +318,25 @@ def decode(
     positive = jnp.where(low > 0, low, 1.0)
     ratio = jnp.where(low > 0, high, 1.0) / positive
     return jnp.where(jnp.asarray(logarithmic), positive * ratio**unit, linear)
+
+
+def by_pieces(function: Callable, values: tuple, length: int):
+    """`function` of pieces of that many rows, one after the other, its results stacked.
+
+    Temporaries stay in the cache. Rows that are no more, or have been in the piece before, are
+    zeros.
+    """
+    lacking = max(0, length - values[0].shape[0])
+    values = tuple(jnp.pad(x, ((0, lacking), *[(0, 0)] * (x.ndim - 1))) for x in values)
+    count = values[0].shape[0]
+
+    def piece(start):
+        at = jnp.minimum(start, count - length)
+        fresh = at + jnp.arange(length) >= start
+        parts = (jax.lax.dynamic_slice_in_dim(x, at, length) for x in values)
+        return function(*(jnp.where(fresh.reshape(-1, *[1] * (x.ndim - 1)), x, 0) for x in parts))
+
+    return jax.lax.map(piece, jnp.arange(0, count, length))
 
 
 def each(function: Callable, rows: Moments, *more):

@@ -55,28 +55,44 @@ def invert_upper(matrix: Float[Array, "p p"]) -> Float[Array, "p p"]:
 
 
 def whiten(
-    gram: Float[Array, "p p"], spanned: float = 0.0
-) -> tuple[Float[Array, "p p"], Float[Array, ""]]:
-    """Upper triangular W with Wᵀ G W = 1, and the least pivot of G scaled to a unit diagonal.
+    gram: Float[Array, "p p"], spanned: Float[Array, "*p"] | float = 0.0
+) -> Float[Array, "p p"]:
+    """Upper triangular W with Wᵀ G W = 1.
 
-    Gram-Schmidt on the unit vectors with the inner product G. A row and column of zeros stays zero
-    in W and has no pivot; where the pivot is not well above rounding, W means nothing. A column
-    with a pivot of `spanned` or less counts as spanned by those before it, and stays zero too.
+    Gram-Schmidt on the unit vectors with the inner product G, scaled to a unit diagonal. A row and
+    column of zeros stays zero in W; a column with a pivot of `spanned` or less counts as spanned by
+    those before it, and stays zero too.
     """
+    return _whiten(gram, spanned)[0]
+
+
+def nearly_white(
+    gram: Float[Array, "p p"], least: float
+) -> tuple[Float[Array, "p p"], Float[Array, " p"]]:
+    """A matrix like that of [`whiten`][], and the pivots that it counts with, `(p,)`, none below
+    `least`: a column that has less is freed of those before it, but no other of that one.
+    """
+    white, rests, pivots = _whiten(gram, least)
+    pivots = jnp.maximum(pivots, least)
+    return white + rests / least**0.5, pivots
+
+
+def _whiten(gram, spanned):
+    """W, the scaled rest of each column that is spanned, and the pivots."""
     diagonal = jnp.diagonal(gram)
     there = diagonal > 0
     scale = jnp.where(there, 1 / jnp.sqrt(jnp.where(there, diagonal, 1.0)), 0.0)
     gram = gram * scale[:, None] * scale[None, :]
 
-    def add(state, place):
-        white, least = state
+    def add(white, item):
+        place, limit = item
         rest = place - white @ (white.T @ (gram @ place))
         pivot = jnp.vdot(rest, gram @ rest)
-        valid = pivot > spanned
-        unit = rest / jnp.sqrt(jnp.where(valid, pivot, 1.0))
-        least = jnp.where(jnp.vdot(place, scale) > 0, jnp.minimum(least, pivot), least)
-        return (white + jnp.where(valid, unit, 0.0)[:, None] * place[None, :], least), None
+        valid = pivot > limit
+        unit = jnp.where(valid, rest / jnp.sqrt(jnp.where(valid, pivot, 1.0)), 0.0)
+        return white + unit[:, None] * place[None, :], (jnp.where(valid, 0.0, rest), pivot)
 
-    start = jnp.zeros_like(gram), jnp.ones((), gram.dtype)
-    (white, least), _ = jax.lax.scan(add, start, jnp.eye(gram.shape[0], dtype=gram.dtype))
-    return scale[:, None] * white, least
+    limits = jnp.broadcast_to(jnp.asarray(spanned, gram.dtype), scale.shape)
+    places = jnp.eye(gram.shape[0], dtype=gram.dtype)
+    white, (rests, pivots) = jax.lax.scan(add, jnp.zeros_like(gram), (places, limits))
+    return scale[:, None] * white, scale[:, None] * rests.T, pivots

@@ -17,8 +17,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from . import small
-from .reduced import Basis, basis_of
+from . import reduced, small
 
 # Votes, and so the degrees of freedom. Correlation times up to 1/(2πK) of the slip time, 2 %, keep
 # the spectrum flat enough; the price is Student's t with 8 degrees: intervals 18 % longer than with
@@ -109,17 +108,37 @@ def deviations(
     **Arguments:** `jacobian`, derivative of the rows by the parameters, `(J, p)`; `error`, the
     residual, `(J,)`; `weight`, `(J,)`; `place`, from [`places`][].
     """
-    root = jnp.sqrt(weight)
-    columns = root[:, None] * jacobian
-    basis = basis_of(columns)
-    upper = jnp.triu(basis.white.T @ (basis.near.T @ columns))
+    length = -(-weight.shape[0] // BLOCKS)
+    many = length * min(BLOCKS, max(1, reduced.PIECE // length))
+
+    def products(jacobian, weight):
+        return jacobian.T @ (weight[:, None] * jacobian)
+
+    def blocks(jacobian, error, weight, place):
+        """Products of the columns with themselves and with the error, and where a block stands."""
+        table = jnp.concatenate([jacobian @ first, error[:, None]], axis=1)
+        table = (jnp.sqrt(weight)[:, None] * table).reshape(-1, length, table.shape[1])
+        own = jnp.einsum("bni,bnj->bij", table[:, :, :-1], table)
+        places = place.reshape(-1, length)
+        count = jnp.maximum(jnp.sum(places > 0, axis=1), 1).astype(place.dtype)
+        return own[:, :, :-1], own[:, :, -1], jnp.sum(places, axis=1) / count
+
+    gram = jnp.sum(reduced.by_pieces(products, (jacobian, weight), many), axis=0)
+    first, pivots = reduced.nearly_white(jax.lax.stop_gradient(gram))
+    pieces = reduced.by_pieces(blocks, (jacobian, error, weight, place), many)
+    own, scores, middles = (x.reshape(-1, *x.shape[2:]) for x in pieces)
+    gram = jnp.sum(own, axis=0)
+    white = reduced.whiten_again(gram, pivots)
+    # The triangular factor R of the columns, from near = columns first.
+    empty = jnp.diag(jnp.where(jnp.diagonal(first) > 0, 0.0, 1.0).astype(first.dtype))
+    upper = jnp.triu(white.T @ gram @ small.invert_upper(first + empty))
     scale = jnp.linalg.norm(upper, axis=0)
     scale = jnp.where(scale > 0, scale, 1.0)
     upper = upper / scale[None, :]
     seen = jnp.diagonal(upper) > jnp.sqrt(jnp.finfo(jacobian.dtype).eps)
     identity = jnp.eye(scale.size, dtype=upper.dtype)
     inverse = small.invert_upper(jnp.where(seen[:, None], upper, identity))
-    votes = _votes(basis, root * error, place, seen)
+    votes = _votes(own, scores, white, jnp.pi * middles, seen)
     spread = votes @ inverse.T / COSINES**0.5
     # A column that the others span, and every column that takes part in spanning it.
     spanned = jnp.where(seen[None, :], 0.0, inverse)
@@ -128,30 +147,25 @@ def deviations(
 
 
 def _votes(
-    basis: Basis,
-    error: Float[Array, " J"],
-    place: Float[Array, " J"],
+    own: Float[Array, "b p p"],
+    scores: Float[Array, "b p"],
+    white: Float[Array, "p p"],
+    angle: Float[Array, " b"],
     seen: Bool[Array, " p"],
 ) -> Float[Array, "K p"]:
     """The scores with each cosine's weights, freed of the fit's pull: (I − A²)⁻¹ Xᵀ C e, A = XᵀCX.
 
-    X are the columns of the basis that are `seen` and C a cosine: the fit leaves e = (I − X Xᵀ) d
-    of the disturbance d, so that of white noise the vote has the covariance XᵀC²X − A², too small
+    X are the columns of the basis that are `seen`, near `white`, of which `own` are the products
+    and `scores` those with the error, block by block; C is a cosine: the fit leaves e = (I − X Xᵀ)
+    d of the disturbance d, so that of white noise the vote has the covariance XᵀC²X − A², too small
     by A². It enters by 15/16, which limits what a direction that the fit explains by itself is
     credited with.
     """
-    near, white = basis.near, basis.white
-    length = -(-near.shape[0] // BLOCKS)
-    whole = ((0, -near.shape[0] % length), (0, 0))
-    blocks = jnp.pad(near, whole).reshape(-1, length, near.shape[1])
-    errors = jnp.pad(error[:, None], whole).reshape(-1, length)
-    middles = jnp.mean(jnp.pad(place[:, None], whole, mode="edge").reshape(-1, length), axis=1)
-    waves = _cosines(jnp.pi * middles)
-    own = jnp.einsum("kb,bij->kij", waves, jnp.einsum("bni,bnj->bij", blocks, blocks))
+    waves = _cosines(angle)
+    own = jnp.einsum("kb,bij->kij", waves, own)
     own = jnp.einsum("ia,kij,jb->kab", white, own, white)
     own = jnp.where(seen[:, None] & seen[None, :], own, 0.0)
-    scores = waves @ jnp.einsum("bni,bn->bi", blocks, errors) @ white
-    scores = jnp.where(seen, scores, 0.0)
+    scores = jnp.where(seen, waves @ scores @ white, 0.0)
     identity = jnp.eye(len(white), dtype=white.dtype)
 
     def freed(own, score):

@@ -52,22 +52,22 @@ def weigh(
     at the samples by all its parameters, affine ones first; `offset`, its known part, N; `place`,
     where each sample stands in the slip time; `weak`, rows of the weak form.
     """
-    friction = offset + jacobian[:, : alpha.size] @ alpha
-    rows = weak.project(jnp.concatenate([jnp.stack([friction, place], 1), jacobian], axis=1))
+    rows, known = weak.project(jacobian), weak.project(jnp.stack([offset, place], axis=1))
     push = weak.rate(recording.velocity)[:, None]
-    left, weight = weak.target - rows[:, 0], weak.positive + weak.negative
+    left = weak.target - known[:, 0] - rows[:, : alpha.size] @ alpha
+    weight = weak.positive + weak.negative
     root = reduced.root(weight)
     mass = reduced.least_squares(root[:, None] * push, root * left)
     left = left - push @ mass
     # What the friction's error leaves is no noise of the rows: it comes in through the friction.
-    columns = jnp.concatenate([push, rows[:, 2:]], axis=1)
+    columns = jnp.concatenate([push, rows], axis=1)
     basis = reduced.orthonormal(root[:, None] * columns)
     noise = reduced.project_out(basis, (root * left)[:, None])[:, 0]
     noise = jnp.where(root > 0, noise / jnp.where(root > 0, root, 1.0), 0.0)
-    own = uncertainty.deviations(push, noise, weight, rows[:, 1])
+    own = uncertainty.deviations(push, noise, weight, known[:, 1])
     weighted = weight * push[:, 0]
     size = jnp.vdot(weighted, push[:, 0])
-    through = -(weighted @ rows[:, 2:]) / jnp.where(size > 0, size, 1.0)
+    through = -(weighted @ rows) / jnp.where(size > 0, size, 1.0)
     return Weighed(mass[0], own, through, left, columns)
 
 
@@ -78,7 +78,12 @@ def open_ends(
 
     Zero for a parameter whose column the ones before it span.
     """
-    weighted = weight[:, None] * columns
-    rounding = float(jnp.finfo(columns.dtype).eps) ** 0.5
-    white = small.whiten(columns.T @ weighted, rounding)[0]
-    return white @ (white.T @ (weighted.T @ slope))
+
+    def products(columns, slope, weight):
+        table = jnp.concatenate([columns, slope[:, None]], axis=1)
+        return columns.T @ (weight[:, None] * table)
+
+    values, piece = (columns, slope, weight), min(reduced.PIECE, len(slope))
+    table = jnp.sum(reduced.by_pieces(products, values, piece), axis=0)
+    white = small.whiten(table[:, :-1], float(jnp.finfo(columns.dtype).eps) ** 0.5)
+    return white @ (white.T @ table[:, -1])
