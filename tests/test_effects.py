@@ -57,6 +57,7 @@ CASES = {
     "frictional_lag_2": (T.FrictionalLag(0.05, T.Exponential(0.05), 2), (4.0,)),
     "backlash": (T.Backlash(0.003), (3.0,)),
     "elastic_backlash": (T.ElasticBacklash(0.003, 0.001, 2.0), (3.0,)),
+    "damped_backlash": (T.DampedBacklash(0.003, 0.001, 2.0, 0.4), (3.0,)),
     "compliance_dry": (T.DryCompliance(4.0, 0.2, 0.5), (2.0,)),
     "compliance": (T.Compliance(2.0, 0.1), (3.0,)),
     "compliance_friction": (T.Compliance(2.0, 0.1, "friction"), (1.5,)),
@@ -461,6 +462,21 @@ def test_slow_backlash_unwinds_crosses_and_winds_up_again():
     wanted = np.interp(since, [0, 0.0005, 0.0045, 0.005], [-1, 0, 0, 1]) - 1
     found = np.asarray(term.columns(run)[:, 0])[time > 10.01]
     np.testing.assert_allclose(found, wanted, atol=0.06)
+
+
+def test_a_load_with_viscous_friction_is_slowed_by_it_in_its_gap():
+    """The motor stops: dw/dt = −d (1 + w/v_s) until the load is at the other flank or at rest."""
+    time = np.arange(4000) / 4000
+    speed = np.where(time < 0.3, 0.2, 0.2 - 4 * np.clip(time - 0.3, 0, 0.05))
+    place = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) / 4000)])
+    run = Recording(time, 0 * time, place, speed)
+    d, slow, gap = 0.5, 0.1, 0.05
+    found = np.asarray(T.DampedBacklash(gap, 1e-5, d, slow).columns(run)[:, 0])
+    flies = (time > 0.31) & (time < 0.34)  # the motor brakes at 4 m/s², the load does not follow
+    np.testing.assert_allclose(found[flies], -1 - speed[flies] / slow, rtol=1e-6)
+    dry = np.asarray(T.ElasticBacklash(gap, 1e-5, d).columns(run)[:, 0])
+    many = np.asarray(T.DampedBacklash(gap, 1e-5, d, 1e9).columns(run)[:, 0])
+    np.testing.assert_allclose(dry, many, atol=1e-6)
 
 
 @pytest.mark.parametrize("driven", ["inertia", "friction", "both"])

@@ -44,10 +44,10 @@ def gap(force=8.0, half_gap=1e-3):
     return axis(terms.Backlash(), backlash_force=force, half_gap=half_gap)
 
 
-def elastic(half_gap=1e-3, windup=2e-4, load_deceleration=4.0):
+def elastic(half_gap=1e-3, windup=2e-4, load_deceleration=4.0, **damped):
     return axis(
-        terms.ElasticBacklash(), backlash_force=8.0, half_gap=half_gap, windup=windup,
-        load_deceleration=load_deceleration,
+        terms.DampedBacklash() if damped else terms.ElasticBacklash(), backlash_force=8.0,
+        half_gap=half_gap, windup=windup, load_deceleration=load_deceleration, **damped,
     )  # fmt: skip
 
 
@@ -107,6 +107,7 @@ CASES = {
     "gap, narrow": gap(15.0, 1e-4),
     "flanks": elastic(),
     "flanks, narrow": elastic(1e-4, 2e-5),
+    "damped": elastic(viscous_speed=0.2),
     "dead time": lagging(0, 3e-3),
     "long dead time": lagging(0, 2e-2),
     "lag": lagging(1, 3e-3),
@@ -176,6 +177,7 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
     p = {name: float(value) for name, value in model.parameters.items()}
     gap = "half_gap" in p
     slow = p.get("load_deceleration", 0.0)
+    slope_load = p["backlash_force"] / p["viscous_speed"] if "viscous_speed" in p else 0.0
     mass = p["backlash_force"] / slow if gap else p["load_inertia"]
     dry = p.get("load_friction", mass * slow)
     omega = np.sqrt(slow / p["windup"]) if gap else 2 * np.pi * p["load_resonance"]
@@ -190,10 +192,10 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
         spring = 0.0 if gap and spring * over <= 0 else spring
         way, way_load = np.tanh(v / 1e-5), np.tanh((v if follows else v_load) / 1e-5)
         s = "+" if v > 0 else "-"
-        own = (p[f"coulomb{s}"] - dry) * way + p[f"viscous{s}"] * v
+        own = (p[f"coulomb{s}"] - dry) * way + (p[f"viscous{s}"] - slope_load) * v
         held = force[min(int(time / STEP + 1e-9), force.size - 1)]
-        rates = (held - own - spring) / (p["inertia"] - mass), (spring - dry * way_load) / mass
-        return [v, rates[0], v_load, rates[1]]
+        load = spring - dry * way_load - slope_load * v_load
+        return [v, (held - own - spring) / (p["inertia"] - mass), v_load, load / mass]
 
     time = np.asarray(clock.time)
     options = {"rtol": 1e-6, "atol": 1e-9, "max_step": STEP}
@@ -201,7 +203,7 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["inertia", "both", "dry", "flanks"])
+@pytest.mark.parametrize("case", ["inertia", "both", "dry", "flanks", "damped"])
 def test_the_motion_is_that_of_two_masses_by_another_solver(case):
     model, clock = CASES[case], driven(0.0)
     clock = driven(40 * np.sin(4 * np.pi * np.asarray(clock.time)))

@@ -53,6 +53,11 @@ class Candidate(NamedTuple):
         return evidence.columns(self.term, self.betas)
 
 
+# Shapes that are scattered over a whole set, and no more than so many steps of them along a motion:
+# some seconds.
+SCATTERED, STEPS = 4096, 2e7
+
+
 class CandidateSet:
     """The candidates for one recording, and their columns, kept from round to round.
 
@@ -67,6 +72,7 @@ class CandidateSet:
         none = np.zeros(evidence.motion.num_samples)
         seen = evidence.with_channels(**dict.fromkeys(PREDICTED, none))
         own = [each for each in self.candidates if not each.term.coordinates & PREDICTED]
+        self._scattered: dict[type, np.ndarray] = {}
         self._widest = _widest(own)
         own = _within([c for c in own if id(c) not in self._widest], len(evidence.target))
         started = begin(functools.partial(_columns, seen), own)
@@ -89,6 +95,23 @@ class CandidateSet:
             return _columns(evidence, candidate)
         lines = candidate.lines
         return known.result() if lines is None else known.result()[:, : 2 * lines.harmonics]
+
+    def scattered(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
+        """Further β, `(G, d)`, of a candidate whose energy has minima between those of its grid.
+
+        The first time many of them over all of the set, then those that were kept.
+        """
+        if candidate.effect.scatter is None:
+            return np.zeros((0, candidate.betas.shape[1]))
+        known = self._scattered.get(type(candidate.term))
+        if known is not None:
+            return known
+        count = min(SCATTERED, int(STEPS // evidence.nodes))
+        return candidate.effect.scatter(candidate.term, view(evidence), count)
+
+    def keep(self, candidate: Candidate, betas: np.ndarray) -> None:
+        """Of these [`scattered`][] β alone is thought again."""
+        self._scattered[type(candidate.term)] = betas
 
     def close(self) -> None:
         """Begin no more columns."""

@@ -9,6 +9,7 @@ import numpy as np
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
+from .many_minima import among_many
 from .outstanding import outstanding
 from .regression import Fit, fit, gains
 from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
@@ -145,7 +146,7 @@ def contest(
     beside = current.energy - bootstrap.scale**2
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
-    finalists = _finals(seen, current, eligible, size, within_reach)
+    finalists = _finals(seen, current, field, eligible, size, within_reach)
     return Contest(trials, finalists, size)
 
 
@@ -194,7 +195,12 @@ def _optima(betas: np.ndarray, gain: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def _finals(
-    seen: Evidence, current: Fit, trials: list[Trial], size: float, within_reach: bool
+    seen: Evidence,
+    current: Fit,
+    field: CandidateSet,
+    trials: list[Trial],
+    size: float,
+    within_reach: bool,
 ) -> list[Finalist]:
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     if not (bent or within_reach):
@@ -209,13 +215,13 @@ def _finals(
         number, trial = numbered
         found = None
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
-            found = _refined(seen, current, trial, basis)
+            found = _refined(seen, current, field, trial, basis)
         if bent and _imitated(trial, current):
             again = _afresh(seen, current, trial)
             found = again if found is None or again.energy < found.energy else found
         if found is not None and _overshadowed(trial, found.alpha):
             trial = _overtone(trial, found)
-            found = _refined(seen, current, trial, basis)
+            found = _refined(seen, current, field, trial, basis)
         if found is None or not _sensible(trial, found.alpha):
             return None
         gain = 1 - found.energy / current.energy
@@ -255,14 +261,17 @@ def _overtone(trial: Trial, found: Finalist) -> Trial:
     return trial._replace(candidate=alone, beta=beta, dimension=2, p_value=1.0)
 
 
-def _refined(seen, current, trial, basis) -> Finalist:
+def _refined(seen, current, field: CandidateSet, trial, basis) -> Finalist:
     """The candidate refined, the rest of the model fitted along to first order."""
     term, starts = trial.candidate.term, (trial.beta, *trial.others)
     between = _between(trial)
     if len(between):
         starts = (between[int(np.argmax(gains(term, seen, between, basis)))],)
-    fits = (fit([term], seen, [beta], 8, basis) for beta in starts)
-    found = min(fits, key=lambda each: each.energy)
+    if term.stepped:
+        found = among_many(trial.candidate, np.stack(starts), seen, current, field, basis)
+    else:
+        fits = (fit([term], seen, [beta], 8, basis) for beta in starts)
+        found = min(fits, key=lambda each: each.energy)
     betas = (*current.betas, found.betas[0])
     return Finalist(0.0, trial, 1.0, found.energy, betas, found.alphas[0])
 

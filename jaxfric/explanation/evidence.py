@@ -175,6 +175,8 @@ def gather(
     parts = node_signals(prepared, limits, step, delay, motion.smoothed)
     index, whole, average, slope = windows(parts, span)
     rows = _moving(parts["velocity"][index], whole, average, limits.slowest, reversals)
+    if prepared.position is not None:
+        rows = _known_from(parts, index[rows, 0], rows, MEMORY * (limits.high - limits.low))
     if len(rows) < FEWEST_ROWS:
         raise ValueError(
             f"{motion.recording.source or 'The recording'} leaves {len(rows)} independent "
@@ -244,6 +246,26 @@ def _moving(speed: np.ndarray, whole: np.ndarray, average: np.ndarray, slowest: 
     one_way = (speed > 0).all(axis=1) | (speed < 0).all(axis=1)
     slips = np.sum(average * moving, axis=1) > 0.5 if reversals else moving.all(axis=1) & one_way
     return np.flatnonzero(whole & slips)
+
+
+# What a machine remembers of the time before a record, how far its bristles are bent or where its
+# load stands in a gap, is gone after a thirtieth of the stroke: a longer memory is no presliding.
+MEMORY = 1 / 30
+# Where that would take a tenth of the rows, of many short segments, they are as good as others.
+FORGOTTEN = 0.1
+
+
+def _known_from(parts: dict, first: np.ndarray, rows: np.ndarray, way: float) -> np.ndarray:
+    """The rows before which the axis has moved by some way, m, since its run of nodes began.
+
+    `first`: the first node of each row.
+    """
+    begins = np.diff(parts["run"], prepend=parts["run"][0] - 1) != 0
+    moved = np.abs(np.diff(parts["position"], prepend=parts["position"][0]))
+    total = np.cumsum(np.where(begins, 0.0, moved))
+    start = np.maximum.accumulate(np.where(begins, total, 0.0))
+    kept = rows[(total - start)[first] > way]
+    return kept if len(kept) > (1 - FORGOTTEN) * len(rows) else rows
 
 
 def _without_simulated(force: np.ndarray, parts: dict, index, rows, average, slope) -> np.ndarray:

@@ -2,14 +2,13 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from ..identification.uncertainty import Estimate
 from ..terms.base import leaves
 from ..terms.effects import traits
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
 from . import parameters as spelled
+from .burdens import IDEALISED, Machine, machine
 from .contest import Contest, Finalist
 from .evidence import Evidence
 from .intervals import aliased
@@ -47,10 +46,10 @@ def _lighter(finalist: Finalist, current: Fit, evidence: Evidence, size: float) 
     if burden is None or burden.lighter is None:
         return None
     own, most = _beside(finalist, current, evidence)
-    too_much = own.friction > most["coulomb"] + most["stribeck_force"]
-    if too_much or not 0 < most["inertia"] < own.inertia:
+    too_much = own.friction > IDEALISED * most.friction
+    if too_much or not 0 < most.inertia < own.inertia:
         return None
-    beta = burden.lighter(LIGHTER * own.inertia / most["inertia"])
+    beta = burden.lighter(LIGHTER * own.inertia / most.inertia)
     there = fit([trial.candidate.term], evidence, [beta], 0, current.basis())
     gain = 1 - there.energy / current.energy
     return finalist._replace(
@@ -78,8 +77,7 @@ def physical(finalist: Finalist, current: Fit, evidence: Evidence) -> bool:
     if burden.give and burden.give > 0.1 * (evidence.limits.high - evidence.limits.low):
         return False
     own, most = _beside(finalist, current, evidence)
-    enough = own.friction <= most["coulomb"] + most["stribeck_force"]
-    return own.inertia <= most["inertia"] and enough
+    return own.inertia <= most.inertia and own.friction <= IDEALISED * most.friction
 
 
 def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> Iterator[int]:
@@ -109,20 +107,9 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
             yield number - start
 
 
-def _beside(
-    finalist: Finalist, current: Fit, evidence: Evidence
-) -> tuple[Burden, dict[str, float]]:
+def _beside(finalist: Finalist, current: Fit, evidence: Evidence) -> tuple[Burden, Machine]:
     """What a term has of inertia and friction, beside all the others, and what the machine has."""
     term = finalist.trial.candidate.term
     both = fit((*current.terms, term), evidence, finalist.betas, 0)
     own = term.burden(both.betas[-1], both.alphas[-1])
-    values = [
-        (p.name.rstrip("+-"), float(a))
-        for t, alpha in zip(both.terms[:-1], both.alphas, strict=False)
-        for p, a in zip(t.affine, alpha, strict=True)
-    ]
-    most = {
-        name: max((a for n, a in values if n == name), default=default)
-        for name, default in (("inertia", np.inf), ("coulomb", np.inf), ("stribeck_force", 0.0))
-    }
-    return own, most
+    return own, machine(both.terms[:-1], both.alphas[:-1])

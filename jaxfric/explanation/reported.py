@@ -84,6 +84,8 @@ def not_confirmed(better: Improved) -> list[Finding]:
 
 def _reason(finding: Finding, better: Improved) -> str:
     """Why a finding is not confirmed, the end of its sentence."""
+    if finding.confirmed is None:  # as the sentence has said
+        return " The model is no better there with it, so it is left out."
     if better.worse is None or not finding.confirmed:
         return " The held-out recording does not bear it out: it is not in the model."
     before, after = better.worse

@@ -15,7 +15,11 @@ from .effects.asymmetric_friction import (
     CoulombAsymmetry as CoulombAsymmetry,
     FrictionAsymmetry as FrictionAsymmetry,
 )
-from .effects.backlash import Backlash as Backlash, ElasticBacklash as ElasticBacklash
+from .effects.backlash import (
+    Backlash as Backlash,
+    DampedBacklash as DampedBacklash,
+    ElasticBacklash as ElasticBacklash,
+)
 from .effects.cogging import Cogging as Cogging, ForceRipple as ForceRipple
 from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance
 from .effects.cross_axis import CrossAxis as CrossAxis

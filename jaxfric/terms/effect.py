@@ -113,6 +113,17 @@ def product(axes) -> np.ndarray:
     return np.stack([axis.ravel() for axis in np.meshgrid(*axes, indexing="ij")], axis=1)
 
 
+def scattered(count: int, dimensions: int) -> np.ndarray:
+    """Places spread evenly in the unit cube, however many, `(count, d)`.
+
+    An additive recurrence by powers of the root of x^(d+1) = x + 1 (Roberts 2018).
+    """
+    roots = np.roots([1, *[0] * (dimensions - 1), -1, -1])
+    root = max(x.real for x in roots if abs(x.imag) < 1e-9)
+    steps = root ** -np.arange(1.0, dimensions + 1)
+    return (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
+
+
 # Fewer periods in the stroke are no repetition.
 REPEATED = 1.5
 # Over time, where anything may wander, a wave has repeated once its second period is over.
@@ -182,6 +193,8 @@ class Effect:
     How it is searched for:
 
     - `waves`: of a law that is a wave, over what; `grid`: of another one the β to try, `(G, d)`.
+    - `scatter`: further β of a law whose energy has minima between neighbours of such a grid, so
+      many of them, `(G, d)`.
     - `outstanding`: laws that the residual itself suggests.
     - `undone`: the recording with the force where it belongs, for a force that acts late by a time,
       s; `shift`: the parameter by which a prediction takes the force later, if by the whole of it.
@@ -222,6 +235,7 @@ class Effect:
     switches: bool = False
     waves: Callable[[Any], Waves | None] = _no_waves
     grid: Callable[[Any, View], np.ndarray] = even
+    scatter: Callable[[Any, View, int], np.ndarray] | None = None
     outstanding: Callable[[Residual], Iterator[AbstractTerm]] = _nothing
     undone: Callable[[Recording, float], Recording] | None = None
     shift: str = ""

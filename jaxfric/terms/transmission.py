@@ -31,14 +31,15 @@ def pushed(
     damping: Float[Array, ""] | float,
     deceleration: Float[Array, ""],
     half_gap: Float[Array, ""] | float | None = None,
+    decay: Float[Array, ""] | float = 0.0,
 ) -> Float[Array, " N"]:
-    """What a load with dry friction is pushed by, per mass, m/s², `(N,)`.
+    """What a load with friction is pushed by, per mass, m/s², `(N,)`.
 
-    For its speed w, dw/dt = p − d sign(w), and at rest it sticks. Without `half_gap` p = ω² s + 2ζω
-    ds/dt, s, m, the way by which the motor, at the recording's position, is ahead; with it, δ, the
-    spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s; `damping` ζ;
-    `deceleration` d, m/s². Stepped semi-implicitly, stable for any stiffness. A segment starts in
-    slip.
+    For its speed w, dw/dt = p − d sign(w) − κ w, and at rest it sticks. Without `half_gap`
+    p = ω² s + 2ζω ds/dt, s, m, the way by which the motor, at the recording's position, is ahead;
+    with it, δ, the spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s;
+    `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. Stepped semi-implicitly, stable for any
+    stiffness. A segment starts in slip.
     """
     begins, speed = starts(recording), recording.velocity
     span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0))) / _STEPS
@@ -56,7 +57,7 @@ def pushed(
         push = push / (1 + span * drag + span**2 * stiffness)
         free = load + span * push
         left = jnp.maximum(jnp.abs(free) - span * deceleration, 0.0)
-        return (ahead, jnp.sign(free) * left), push
+        return (ahead, jnp.sign(free) * left / (1 + span * decay)), push
 
     def step(state, now):
         span, way, last, speed, begin = now
@@ -67,9 +68,10 @@ def pushed(
             total = total + push / _STEPS
         ahead, load = state
         side = jnp.sign(speed)
-        wound = side * (gap + deceleration / stiffness)
+        slips = side * deceleration + decay * speed
+        wound = side * gap + slips / stiffness
         state = jnp.where(begin, wound, ahead), jnp.where(begin, speed, load)
-        return state, jnp.where(begin, side * deceleration, total)
+        return state, jnp.where(begin, slips, total)
 
     zero = jnp.zeros_like(speed[0])
     push = jax.lax.scan(step, (zero, zero), (span, way, last, speed, begins))[1]
@@ -88,12 +90,14 @@ class DryLoad(NamedTuple):
     damping: Float[Array, ""] | float
     deceleration: Float[Array, ""]
     half_gap: Float[Array, ""] | float | None = None
+    decay: Float[Array, ""] | float = 0.0
 
     def start(self, velocity: Float[Array, ""]) -> States:
         """In slip, wound up by the load's friction."""
         side = jnp.sign(velocity)
         gap = 0.0 if self.half_gap is None else self.half_gap
-        wound = side * (gap + self.deceleration / self.omega**2)
+        slips = side * self.deceleration + self.decay * velocity
+        wound = side * gap + slips / self.omega**2
         return States(jnp.stack([wound, velocity]), jnp.stack([side, side]))
 
     def push(self, states: States, velocity: Float[Array, ""]) -> Float[Array, ""]:
@@ -109,8 +113,9 @@ class DryLoad(NamedTuple):
     def rates(self, states: States, now: Instant) -> Float[Array, " 2"]:
         """The derivative of `flow`."""
         side = states.kept[0]
-        slowed = self.push(states, now.velocity) - self.deceleration * side
-        slip = now.velocity - states.flow[1]
+        load = states.flow[1]
+        slowed = self.push(states, now.velocity) - self.deceleration * side - self.decay * load
+        slip = now.velocity - load
         return jnp.stack([slip, jnp.where(side == 0, 0.0, slowed)])
 
     def ready(self, states: States, now: Instant) -> States:

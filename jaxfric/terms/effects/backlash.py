@@ -1,5 +1,6 @@
 """A gap between motor and load."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax
@@ -11,11 +12,12 @@ from ...data.recording import Recording
 from ...units import (
     FORCE,
     POSITION,
+    VELOCITY,
 )
 from ..base import AbstractTerm
-from ..effect import Effect, View, even, inside, product
+from ..effect import Effect, Extent, View, even, inside, product, scattered
 from ..presliding import AbstractStates, States, starts
-from ..sample import UNKNOWN, Burden, Parameter
+from ..sample import UNKNOWN, Burden, Parameter, Resolution
 from ..transmission import DECELERATION, OCTAVES, DryLoad, pushed
 from .compliance import coasting
 
@@ -119,7 +121,7 @@ class ElasticBacklash(AbstractStates):
     windup: Float[Array, ""] | float = UNKNOWN
     load_deceleration: Float[Array, ""] | float = UNKNOWN
     affine: ClassVar = (Parameter("backlash_force", FORCE),)
-    nonlinear: ClassVar = (
+    nonlinear: ClassVar[tuple[Parameter, ...]] = (
         Parameter("half_gap", POSITION, _gap_bounds, resolution=OCTAVES),
         Parameter("windup", POSITION, _windup_bounds, resolution=OCTAVES),
         DECELERATION,
@@ -145,12 +147,18 @@ class ElasticBacklash(AbstractStates):
 
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
         omega = jnp.sqrt(self.load_deceleration / self.windup)
-        push = pushed(recording, omega, _FLANKS, self.load_deceleration, self.half_gap)
+        load = self.load_deceleration, self.half_gap, self.decay
+        push = pushed(recording, omega, _FLANKS, *load)
         return (push / self.load_deceleration - jnp.sign(recording.velocity))[:, None]
 
     @property
     def _load(self) -> DryLoad:
-        return DryLoad(self.pace, _FLANKS, self.load_deceleration, self.half_gap)
+        return DryLoad(self.pace, _FLANKS, self.load_deceleration, self.half_gap, self.decay)
+
+    @property
+    def decay(self):
+        """By how much a second the load's viscous friction slows it, 1/s."""
+        return 0.0
 
     @property
     def shed(self):
@@ -184,15 +192,89 @@ class ElasticBacklash(AbstractStates):
         return self._load.settled(states)
 
 
+def _speed_bounds(scales):
+    """Of guides and gears the viscous friction at full speed is three times the dry one at most;
+    to one that has nearly none of it.
+    """
+    return scales.fastest / 3, 30 * scales.fastest
+
+
+class DampedBacklash(ElasticBacklash):
+    """[`ElasticBacklash`][] with a load that has viscous friction too, F_L (sign w + w/v_s).
+
+    `viscous_speed` v_s, m/s: there it is as large as the dry friction F_L. So a load that flies
+    through the gap is slowed by (1 + w/v_s) d.
+    """
+
+    viscous_speed: Float[Array, ""] | float = UNKNOWN
+    nonlinear: ClassVar = (
+        *ElasticBacklash.nonlinear,
+        Parameter("viscous_speed", VELOCITY, _speed_bounds, resolution=Resolution(0, 0.5, None, 4)),
+    )
+
+    def burden(self, beta, alpha) -> Burden:
+        burden = super().burden(beta[:3], alpha)
+        return burden._replace(lighter=lambda factor: beta * np.array([1.0, 1.0, factor, 1.0]))
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        return super().columns(recording) - recording.velocity[:, None] / self.viscous_speed
+
+    def present(self, states, now):
+        return super().present(states, now) - now.velocity / self.viscous_speed
+
+    @property
+    def decay(self):
+        return self.load_deceleration / self.viscous_speed
+
+
 def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     """Gaps and windups from what is crossed in a twentieth of the kernel's reach to the widest."""
     if not isinstance(term, ElasticBacklash):
         return even(term, view)
-    low, high = inside(term, view.limits, np.array([[0.0] * 3, [1.0] * 3]))
+    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4))))
     least = 0.25 * view.acceleration * (view.reach / 20) ** 2
     least = np.clip(least, low[0], 0.1 * high[0])
-    widths, windups = (np.geomspace(least, high[0], n) for n in (10, 7))
-    return product([widths, windups, coasting(view)])
+    # A stiff flank is soon passed, whatever its stiffness; a load's viscous friction at full speed
+    # is mostly as large as its dry one, or of no account.
+    widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
+    speeds = view.limits.fastest * np.array([1.0, 5.0])
+    return product([widths, windups, coasting(view), speeds])
+
+
+def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
+    """Gaps, windups and decelerations of loads that the motor's own deceleration lets go of.
+
+    When they leave a flank, and when they strike the next one, follows from all of them together:
+    a tenth of one decides. A load that is slowed less than a twentieth as fast as the motor hardly
+    changes its speed in flight, one that is slowed three times as fast never leaves its flank. Gaps
+    are up to a thirtieth of the stroke: what has more is no gear.
+    """
+    if not isinstance(term, ElasticBacklash):
+        return np.zeros((0, len(term.nonlinear)))
+    place = scattered(count, 4)
+    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4))))
+    least = np.clip(0.25 * view.acceleration * (view.reach / 20) ** 2, low[0], 0.1 * high[0])
+    stroke = view.limits.high - view.limits.low
+    widest = np.maximum(stroke / 30, 2 * least)
+    half_gap = least * (widest / least) ** place[:, 0]
+    windup = half_gap * 10.0 ** (-3 * place[:, 1])
+    slowed = view.acceleration * 0.05 * 60.0 ** place[:, 2]  # at half the full speed
+    ratio = 0.05 * 30.0 ** place[:, 3]  # viscous friction by dry friction there
+    speed = 0.5 * view.limits.fastest / ratio
+    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed], axis=1)
+    ends = inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4)))
+    return np.clip(found, *ends)
+
+
+def _flying(values: Mapping[str, float], extent: Extent) -> str | None:
+    """Another sentence for a load with a mass of its own."""
+    if "load_deceleration" not in values:
+        return None
+    return (
+        "A load with {backlash_force} of friction crosses a gap of twice {half_gap} after a "
+        "reversal, and where the motor brakes harder than the load slows down by itself, by "
+        "{load_deceleration}: backlash"
+    )
 
 
 BACKLASH = Effect(
@@ -201,17 +283,20 @@ BACKLASH = Effect(
     "reversals",
     "After a reversal {backlash_force} of friction is absent while a gap of twice {half_gap} is "
     "crossed: backlash",
-    laws=(Backlash, ElasticBacklash),
+    laws=(Backlash, DampedBacklash),
     coordinates=("distance_since_reversal",),
     needs=frozenset({"position"}),
     confusable_with=("presliding", "compliance", "transport_delay"),
-    separate_by="Repeat the motion at half the speed: a delay scales with force rate, a gap does "
-    "not.",
+    separate_by="Move to and fro by less than the gap: in it the force does not grow with the way, "
+    "on a spring it does. Repeat the motion at half the speed: a delay scales with force rate, a "
+    "gap does not.",
     positive=True,
     first_order=True,
     at_reversals=True,
     leftover=True,
     grid=gaps,
+    scatter=flights,
+    variant=_flying,
     sizes=("backlash_force",),
     vanishes=("half_gap",),
 )

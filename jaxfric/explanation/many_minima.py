@@ -1,0 +1,66 @@
+"""The search for laws whose energy has many minima: loads that are stepped along the motion.
+
+A load that flies through a gap strikes a flank sooner or later by a little of any parameter. So β
+is scattered over all of its set, then about the best of these and of the grid over a step of the
+grid, then over half of that, and so on.
+"""
+
+import numpy as np
+
+from ..terms.effect import scattered
+from .burdens import largest
+from .candidates import Candidate, CandidateSet
+from .evidence import Evidence
+from .regression import Fit, fit, gains
+
+# So many about each of the best, so often.
+AROUND, BEST, ROUNDS = 64, 3, 4
+# Of those scattered over the whole set, how many are looked at again.
+WORTH = 64
+
+
+def among_many(
+    candidate: Candidate,
+    starts: np.ndarray,
+    seen: Evidence,
+    current: Fit,
+    field: CandidateSet,
+    basis: np.ndarray,
+) -> Fit:
+    """A law that is stepped along the motion beside the basis, `(J, r)`, of a fit.
+
+    Its load is a part of the machine. `starts`: the best β of its grid, `(S, d)`.
+    """
+    term = candidate.term
+    left = seen.target - basis @ (basis.T @ seen.target)
+
+    def gained(betas: np.ndarray) -> np.ndarray:
+        """The energy that the law removes, N², with no more of a load than the machine has."""
+        most = largest(term, betas, current)
+        if not np.isfinite(most).all():
+            return gains(term, seen, betas, basis)
+        own = seen.columns(term, betas)[:, :, 0]
+        own = own - (own @ basis) @ basis.T
+        along, square = own @ left, np.einsum("gj,gj->g", own, own)
+        size = np.clip(along / np.where(square > 0, square, 1.0), 0.0, most)
+        return size * (2 * along - size * square)
+
+    def within(found: Fit) -> bool:
+        most = largest(term, np.stack(found.betas), current)
+        return bool(np.all(found.alphas[0] <= most))
+
+    best, wide = starts, field.scattered(candidate, seen)
+    if len(wide):
+        wide = wide[np.argsort(-gained(wide), kind="stable")[:WORTH]]
+        field.keep(candidate, wide)
+        best = np.concatenate([starts, wide[: 2 * BEST]])
+    values = [np.log(np.unique(each)) for each in candidate.betas.T]
+    step = np.array([np.max(np.diff(each), initial=0.0) for each in values])
+    scatter = 2 * scattered(AROUND, len(step)) - 1
+    for number in range(ROUNDS):
+        spread = np.exp(scatter * step / 2**number)
+        tried = np.concatenate([best, *(each * spread for each in best)])
+        best = tried[np.argsort(-gained(tried), kind="stable")[:BEST]]
+    fits = [fit([term], seen, [beta], 8, basis) for beta in (*best, *starts)]
+    inside = [each for each in fits if within(each)] or [fit([term], seen, [best[0]], 0, basis)]
+    return min(inside, key=lambda each: each.energy)
