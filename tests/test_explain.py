@@ -1540,6 +1540,18 @@ def test_what_halves_the_residual_is_no_chance_though_another_recording_refutes_
     assert not verdict.halved([types.SimpleNamespace(share=0.4)] * 2) and not verdict.halved([])
 
 
+def test_what_a_law_halves_is_no_noise_though_it_was_not_accepted():
+    def contest(energy, p_value):
+        return types.SimpleNamespace(
+            finalists=[types.SimpleNamespace(energy=energy, p_value=p_value)]
+        )
+
+    last = types.SimpleNamespace(energy=1.0)
+    assert verdict.halvable(contest(0.4, 0.002), last)
+    assert not verdict.halvable(contest(0.6, 0.002), last)
+    assert not verdict.halvable(contest(0.4, 0.3), last)
+
+
 @pytest.mark.parametrize(
     ("error", "noise", "missing"),
     [(0.26, 0.10, True), (0.11, 0.10, False), (0.04, 0.002, False), (0.6, 0.5, True)],

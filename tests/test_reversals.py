@@ -206,3 +206,34 @@ def test_an_axis_that_sticks_is_asked_once():
     problem, found = searched(recording)
     assert not problem.reversals and found.in_slip is None
     assert across_reversals(recording, problem) is problem
+
+
+def bent(seed, begin, distance=1e-3):
+    """An axis with bristles that are bent by `begin` where its record begins at rest."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(16000) / RATE
+    leg, since = np.divmod(time, 1.0)
+    leg, share = leg.astype(int), np.clip(since / 0.9, 0, 1)
+    ends = 0.05 * (-1.0) ** np.arange(18) * (0.6 + 0.4 * rng.random(18))
+    place = ends[leg] + (ends[leg + 1] - ends[leg]) * share**3 * (10 - 15 * share + 6 * share**2)
+    state = np.full_like(place, begin)
+    for i, way in enumerate(np.diff(place)):
+        state[i + 1] = state[i] + (np.sign(way) - state[i]) * (1 - np.exp(-abs(way) / distance))
+    speed = np.gradient(place, time)
+    force = 5 * np.gradient(speed, time) + 20 * state + 60 * speed
+    return Recording(time, force + rng.normal(0, 0.05, time.size), place)
+
+
+@pytest.mark.parametrize("begin", [1.0, pytest.param(0.0, marks=pytest.mark.slow)])
+def test_what_a_machine_remembers_from_before_the_record_has_no_name(begin):
+    found = explain(bent(1, begin), "coulomb-viscous", bent(2, 1.0))
+    assert [each.effect for each in found.findings] == ["presliding"]
+    assert found.verdict == "explained"
+
+
+def test_short_segments_keep_their_rows():
+    parts = {"run": np.repeat(np.arange(10), 10), "position": np.tile(np.arange(10.0), 10)}
+    rows = np.arange(80)
+    np.testing.assert_array_equal(evidence._known_from(parts, rows, rows, 5.0), rows)
+    parts = {"run": np.zeros(100, int), "position": np.arange(100.0)}
+    np.testing.assert_array_equal(evidence._known_from(parts, rows, rows, 5.0), rows[6:])

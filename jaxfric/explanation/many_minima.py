@@ -17,6 +17,9 @@ from .regression import Fit, fit, gains
 AROUND, BEST, ROUNDS = 64, 3, 4
 # Of those scattered over the whole set, how many are looked at again.
 WORTH = 64
+# The part of the energy that what is found among thousands has to remove: the threshold of the grid
+# is not theirs.
+BEYOND_CHANCE = 0.5
 
 
 def among_many(
@@ -61,6 +64,10 @@ def among_many(
         spread = np.exp(scatter * step / 2**number)
         tried = np.concatenate([best, *(each * spread for each in best)])
         best = tried[np.argsort(-gained(tried), kind="stable")[:BEST]]
-    fits = [fit([term], seen, [beta], 8, basis) for beta in (*best, *starts)]
-    inside = [each for each in fits if within(each)] or [fit([term], seen, [best[0]], 0, basis)]
-    return min(inside, key=lambda each: each.energy)
+    near, far = ([fit([term], seen, [beta], 8, basis) for beta in some] for some in (starts, best))
+    far = [each for each in far if within(each)] or [fit([term], seen, [best[0]], 0, basis)]
+    found = min(far, key=lambda each: each.energy)
+    near = [each for each in near if within(each)] or near
+    if found.energy > (1 - BEYOND_CHANCE) * current.energy:
+        return min(near, key=lambda each: each.energy)
+    return min((found, *near), key=lambda each: (not within(each), each.energy))

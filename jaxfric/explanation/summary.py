@@ -10,6 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import parameters as spelled, structure, verification
+from .acceptance import LINEARITY
 from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, creeping, doubts, not_better
@@ -23,7 +24,7 @@ from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
-from .verdict import beside_rows, halved, rough, stand_ins, verdict_of
+from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
 from .wording import ELSEWHERE
 
 
@@ -68,6 +69,8 @@ def summarise(
         [s for s in some if s.coordinate not in known.structured] for some in (before, after)
     )
     missing = rough(filtered, shares) or beside_rows(errors) or halved(refuted)
+    if not findings and filtered["force_error"]["after"] > LINEARITY:
+        missing |= halvable(selection.remaining, selection.last)
     # Values that are known in both recordings and differ: no one model holds for both.
     missing |= bool(apart and errors.get("holdout_values"))
     much = missing and not known.rough

@@ -8,8 +8,11 @@ import numpy as np
 from ..checks import LEFT, Remark
 from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY
+from .contest import Contest
 from .doubts import NOT_BETTER
 from .finding import Finding
+from .regression import Fit
+from .significance import LEVEL
 from .wording import LARGE
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
@@ -68,6 +71,16 @@ def halved(refuted: Sequence[Finding]) -> bool:
     Noise cannot be removed: then something is missing, though it has another name.
     """
     return any(finding.share > 1 - HALF**2 for finding in refuted)
+
+
+def halvable(remaining: Contest, last: Fit) -> bool:
+    """Whether a law that was not accepted removes half of what is left, beyond chance.
+
+    Noise cannot be halved, that of the encoder by the controller's answer neither: then something
+    is missing, though that law is not its name.
+    """
+    left = last.energy * (1 - HALF)
+    return any(f.p_value <= LEVEL and f.energy < left for f in remaining.finalists)
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of
