@@ -253,7 +253,35 @@ def test_a_batch_says_how_many_and_medians(batch, fit):
 
 
 def test_a_row_of_a_batch_prints_as_the_fit(batch, fit):
-    assert str(jax.tree.map(lambda x: x[0], batch)) == str(fit)
+    assert str(batch[0]) == str(jax.tree.map(lambda x: x[0], batch)) == str(fit)
+
+
+def test_rows_of_a_batch_by_number(batch, fit):
+    assert len(batch) == len(list(batch)) == 4
+    assert [row.result_name for row in batch] == ["successful"] * 3 + ["no_slip"]
+    assert batch[-1].result_name == "no_slip"
+    assert batch[0].remarks == fit.remarks
+    assert len(batch[1:]) == 3
+    assert len(batch[np.array([0, 3])]) == 2
+    with pytest.raises(IndexError, match="no row 4: the batch has 4"):
+        batch[4]
+    with pytest.raises(TypeError, match="one identification, not a batch"):
+        fit[0]
+    assert fit
+
+
+@pytest.mark.parametrize("name", ["result_name", "remarks", "diagnosis"])
+def test_what_is_of_one_row_names_the_remedy(batch, name):
+    with pytest.raises(ValueError, match=rf"no {name} of its own. Of a batch .* fits\[0\]"):
+        getattr(batch, name)
+
+
+def test_a_batch_of_models_names_the_remedy(batch):
+    with pytest.raises(ValueError, match=r"not a batch: give a row, fits\[i\].model"):
+        batch.model.friction(0.1)
+    with pytest.raises(ValueError, match="not a batch"):
+        batch.model.to_dict()
+    assert jax.vmap(lambda model: model.friction(0.1))(batch.model).shape == (4,)
 
 
 def test_traced_and_without_values_the_structure_is_printed(fit, batch, recording):

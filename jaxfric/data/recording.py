@@ -155,7 +155,10 @@ class Recording(eqx.Module):
         **Raises:** `ValueError` for a batch, for a name there is not, or without matplotlib.
         """
         if self.time.ndim != 1:
-            raise ValueError(f"plot() draws one recording. {text.A_ROW}")
+            raise ValueError(
+                "plot() draws one recording. Of a batch take a row: "
+                "jax.tree.map(lambda x: x[0], batch)."
+            )
         alone = ax is not None and np.ndim(ax) == 0
         names = names or (("force",) if alone else tuple(summary.main_signals(self)))
         panels = drawing.panels(ax, len(names))

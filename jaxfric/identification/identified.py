@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -83,6 +84,9 @@ LEAST_EXPLAINED = 0.5
 class Identified(eqx.Module):
     """What identification found.
 
+    Of a batch every leaf has a leading axis. `fits[i]` is the row `i` as an `Identified` of its
+    own, `fits[2:5]` a smaller batch, `len(fits)` the number of rows.
+
     - `model`: the sum with its parameters, a [`Model`][jaxfric.models.Model].
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible. Outside of `jax.jit` it
       holds what a force that acts up to one and a half samples late makes of the parameters.
@@ -113,9 +117,35 @@ class Identified(eqx.Module):
     rival: Float[Array, " d"] | None = None
     warnings: Float[Array, " W"] = eqx.field(default_factory=checks.none)
 
+    def __len__(self) -> int:
+        if self.covariance.ndim < 3:
+            raise TypeError(
+                "This is one identification, not a batch: it has no rows. Its numbers are in "
+                '.parameters, as .parameters["coulomb+"].value.'
+            )
+        return self.covariance.shape[0]
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __getitem__(self, row) -> "Identified":
+        """One row of a batch by its number, counted from the end if negative; or some, by a slice
+        or an array.
+        """
+        size = len(self)
+        # An array of jax takes its last row for a number that is too large.
+        if isinstance(row, int | np.integer) and not -size <= row < size:
+            raise IndexError(f"There is no row {row}: the batch has {size}, from 0.")
+        return jax.tree.map(lambda x: x[row], self)
+
+    def _require_one(self, name: str) -> None:
+        if self.covariance.ndim != 2:
+            raise ValueError(f"A batch has no {name} of its own. {text.A_ROW}")
+
     @property
     def diagnosis(self) -> str:
         """What the result means; for one recording: of a batch, take a row."""
+        self._require_one("diagnosis")
         # By its name: equinox has no words for a member that is a number of numpy.
         said = str(Result[getattr(Result, self.result_name)])
         if self.result_name == "not_described":
@@ -127,6 +157,7 @@ class Identified(eqx.Module):
     @property
     def result_name(self) -> str:
         """The name of the result's member; for one recording: of a batch, take a row."""
+        self._require_one("result_name")
         return result_names()[int(self.result._value)]
 
     def _elsewhere(self) -> str:
@@ -140,6 +171,7 @@ class Identified(eqx.Module):
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is wrong with the recording or the fit, in sentences; of a batch, take a row."""
+        self._require_one("remarks")
         return checks.remarks(self.warnings, dict(self.model.units))
 
     @property
@@ -186,8 +218,7 @@ class Identified(eqx.Module):
 
         **Raises:** `ValueError` for a batch, or without matplotlib.
         """
-        if self.covariance.ndim != 2:
-            raise ValueError(f"plot() draws one identification. {text.A_ROW}")
+        self._require_one("plot()")
         axes = drawing.panels(ax, 1, 4.4)[0]
         units, source = dict(self.model.units), "" if recording is None else recording.source
         if recording is None:
@@ -207,8 +238,7 @@ class Identified(eqx.Module):
 
         **Raises:** `ValueError` for a batch.
         """
-        if self.covariance.ndim != 2:
-            raise ValueError(f"to_dict() is of one identification. {text.A_ROW}")
+        self._require_one("to_dict()")
         test = None if recording is None else constant_velocity(recording, self)
         stick = None if recording is None else breakaway(recording, self)
         document = documents.identification(text.on_host(self), recording, test=test, stick=stick)

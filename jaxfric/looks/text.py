@@ -9,8 +9,8 @@ import jax
 import numpy as np
 
 WIDTH = 98
-# What to do with a batch where one result is wanted.
-A_ROW = "Of a batch take a row: jax.tree.map(lambda x: x[0], batch)."
+# What to do with a batch of results where one is wanted.
+A_ROW = "Of a batch take a row: fits[0], or each: for fit in fits."
 
 
 class Table(NamedTuple):

@@ -86,7 +86,10 @@ class Model(eqx.Module):
 
         **Arguments:** `velocity`, m/s, any shape. Sticking (v = 0) is not slip; there the value
         is that of the constant terms.
+
+        **Raises:** `ValueError` for a batch of models.
         """
+        require(self, "friction()")
         return _slip_friction(self, jnp.asarray(velocity))
 
     def without(self, prefix: str) -> "Model":
@@ -167,6 +170,7 @@ class Model(eqx.Module):
 
     def to_dict(self) -> dict[str, Any]:
         """The model as plain data for JSON: structure, parameters with units."""
+        require(self, "to_dict()")
         dimensions = {p.name: p.dimension for p in (*self.term.affine, *self.term.nonlinear)}
         parameters = {
             name: {"value": saved.known(value), "unit": spell(dimensions[name], dict(self.units))}
@@ -290,8 +294,8 @@ def require(model: object, verb: str) -> None:
     if isinstance(model, Model):
         if jnp.ndim(model.alpha) != 1:
             raise ValueError(
-                f"{verb} takes one model, not a batch: give a row, "
-                "jax.tree.map(lambda x: x[i], model), or use jax.vmap."
+                f"{verb} takes one model, not a batch: give a row, fits[i].model "
+                "(jax.tree.map(lambda x: x[i], model)), or use jax.vmap."
             )
         return
     hint = "Load a saved one: jaxfric.models.load(text)."
