@@ -1,6 +1,7 @@
 """Identification on known machines, in batches, through jit and grad, and on real recordings."""
 
 import dataclasses
+import re
 
 import equinox as eqx
 import jax
@@ -353,3 +354,25 @@ def test_a_force_at_its_stamp_stays_there():
 def test_what_is_traced_is_not_aligned():
     with pytest.raises(ValueError, match=r"not known inside jax\.jit"):
         jax.jit(lambda log: jf.identify("coulomb-viscous", log, align=True).model.alpha)(held())
+
+
+@pytest.mark.parametrize("weight, told", [(0.0, False), (1.0, False), (5.0, True), (-40.0, True)])
+def test_a_constant_load_in_directional_friction_is_told(weight, told):
+    run = recording(machine("coulomb-viscous"), noise=0.1)
+    run = dataclasses.replace(run, force=run.force + weight)
+    found = jf.identify("coulomb-viscous", run)
+    remarks = {remark.name: remark for remark in found.remarks}
+    assert set(remarks) == ({"constant_load"} if told else set())
+    assert "as in no passive axis" not in repr(found)
+    if told:
+        said = remarks["constant_load"].text
+        load = float(re.search(r"a weight \((-?[\d.]+) N beside a friction of 11.5", said)[1])
+        # Half of what the directions' own friction differs by is in it.
+        assert load == pytest.approx(weight + 0.5, abs=0.1)
+        assert "--model symmetric-coulomb-viscous has the load as offset." in said
+
+
+def test_a_force_of_the_wrong_sign_is_no_load():
+    run = recording(machine("coulomb-viscous"), noise=0.1)
+    found = jf.identify("coulomb-viscous", dataclasses.replace(run, force=-run.force))
+    assert [remark.name for remark in found.remarks] == ["negative_parameter"]

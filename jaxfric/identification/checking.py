@@ -13,7 +13,7 @@ from .. import checks, signals
 from ..checks import Design
 from ..data.recording import Recording, row_of
 from ..terms.base import changed_columns, summands
-from . import uncertainty
+from . import constant_load, uncertainty
 from .identified import Identified, Result, result_names
 
 
@@ -85,7 +85,10 @@ def checked(
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
-        if negative := int(np.sum((alpha + half)[passive] < 0)):
+        # Of a load beyond the dry friction one direction has the friction less the load.
+        loaded = constant_load.load(names, alpha, half) is not None
+        counted = [k for k in passive if not (loaded and names[k].startswith("coulomb"))]
+        if negative := int(np.sum((alpha + half)[counted] < 0)):
             warnings[i, checks.NAMES.index("negative_parameter")] = negative
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])

@@ -16,7 +16,7 @@ from ..looks import drawing, html, text
 from ..looks.text import Block
 from ..models import Model
 from ..units import VELOCITY, spell
-from . import batch, curves, documents, tabulate, uncertainty
+from . import batch, constant_load, curves, documents, tabulate, uncertainty
 from .breakaway import breakaway
 from .constant_velocity import constant_velocity
 from .uncertainty import Estimate
@@ -172,7 +172,8 @@ class Identified(eqx.Module):
     def remarks(self) -> tuple[Remark, ...]:
         """What is wrong with the recording or the fit, in sentences; of a batch, take a row."""
         self._require_one("remarks")
-        return checks.remarks(self.warnings, dict(self.model.units))
+        load = constant_load.remark(self)
+        return (*checks.remarks(self.warnings, dict(self.model.units)), *([load] if load else ()))
 
     @property
     def names(self) -> tuple[str, ...]:

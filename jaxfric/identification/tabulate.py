@@ -9,6 +9,7 @@ from ..data import summary
 from ..data.printable import printable
 from ..looks.text import Block, Table, aligned, text, wrapped
 from ..models import NAMED
+from .constant_load import NAME as LOAD
 
 # The result whose diagnosis needs no words.
 FINE = "successful"
@@ -69,7 +70,7 @@ def identified(
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
     if document["result"] != "not_passive":
-        told += _remarks(document["parameters"])
+        told += _remarks(document["parameters"], document["warnings"])
     chosen = standings(document["selection"]) if "selection" in document else []
     return [
         _source(document),
@@ -205,13 +206,14 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _remarks(parameters: Mapping[str, Any]) -> list[str]:
-    """What an engineer would object to, said first."""
+def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What an engineer would object to, said first; what the warnings say is not said again."""
     seen = {name: entry for name, entry in parameters.items() if entry["interval"]}
     sizes = {name: (entry["value"], _half(entry)) for name, entry in seen.items()}
     falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
     faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half]
-    passive = ("coulomb", "viscous", "inertia")
+    loaded = any(warning["name"] == LOAD for warning in said)
+    passive = ("viscous", "inertia") if loaded else ("coulomb", "viscous", "inertia")
     wrong = [n for n, (value, half) in sizes.items() if n.startswith(passive) and value < -half]
     lines = []
     if falling:
