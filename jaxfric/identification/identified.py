@@ -118,12 +118,12 @@ class Identified(eqx.Module):
     warnings: Float[Array, " W"] = eqx.field(default_factory=checks.none)
 
     def __len__(self) -> int:
-        if self.covariance.ndim < 3:
+        if not np.ndim(self.result._value):
             raise TypeError(
                 "This is one identification, not a batch: it has no rows. Its numbers are in "
                 '.parameters, as .parameters["coulomb+"].value.'
             )
-        return self.covariance.shape[0]
+        return np.shape(self.result._value)[0]
 
     def __bool__(self) -> bool:
         return True
@@ -139,7 +139,7 @@ class Identified(eqx.Module):
         return jax.tree.map(lambda x: x[row], self)
 
     def _require_one(self, name: str) -> None:
-        if self.covariance.ndim != 2:
+        if np.ndim(self.result._value):
             raise ValueError(f"A batch has no {name} of its own. {text.A_ROW}")
 
     @property
