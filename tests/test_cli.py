@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import jaxfric
 from jaxfric import models
 from jaxfric.cli import commands, main
+from jaxfric.cli.values import names
 from jaxfric.data import io
 from jaxfric.data.recording import LONG, PADDING, uniform
 from jaxfric.identification import documents
@@ -445,3 +447,10 @@ def test_a_held_force_is_aligned_on_request(tmp_path, capsys):
     moving = table["in_motion"] > 0
     left = (table["measured_force"] - table["force"])[moving]
     assert np.linalg.norm(left) < 0.01 * np.linalg.norm(table["measured_force"][moving])
+
+
+def test_a_value_with_a_comma_stands_in_quotation_marks():
+    said = names('position="pos, act [mm]",velocity=vel=act,force=M;x,load=')
+    assert said == {"position": "pos, act [mm]", "velocity": "vel=act", "force": "M;x", "load": ""}
+    with pytest.raises(ArgumentTypeError, match="quotation marks"):
+        names("position=pos, act [mm]")

@@ -90,7 +90,8 @@ def _columns(command: ArgumentParser):
         type=names,
         default={},
         metavar="ROLE=NAME,…",
-        help="for instance force=vir,position=qm; neighbour_velocity=v2 for an axis beside it",
+        help="for instance force=vir,position=qm; a name with a comma in quotation marks; "
+        "neighbour_velocity=v2 for an axis beside it",
     )
     group.add_argument(
         "--scale",

@@ -1,6 +1,7 @@
 """Types of the command's option values: each reads a text, or says what is wrong with it."""
 
 import math
+import re
 from argparse import ArgumentTypeError
 from pathlib import Path
 
@@ -9,17 +10,24 @@ from ..data.targets import replaced
 # Gains of each controller that `simulate` knows; `limit` bounds the force of any of them.
 CONTROLLERS = {"pd": ("kp", "kd"), "pid": ("kp", "ki", "kd"), "cascade": ("kp", "kv")}
 TABLES = (".csv", ".npz", ".parquet")
+# A pair up to the next comma, which a value in quotation marks may hold.
+_ITEM = r'(?:[^,="]*="[^"]*"\s*(?=,|$)|[^,])+'
 PICTURES = ("png", "pdf", "svg")
 
 
 def names(text: str) -> dict[str, str]:
-    """`a=b,c=d` as a mapping."""
+    """`a=b,c=d` as a mapping; a value with a comma stands in quotation marks, `a="b, c"`."""
     pairs = {}
-    for item in filter(None, (part.strip() for part in text.split(","))):
+    for item in filter(None, (part.strip() for part in re.findall(_ITEM, text))):
         key, equals, value = item.partition("=")
         if not equals or not key.strip():
-            raise ArgumentTypeError(f"{item!r} is not of the form NAME=VALUE")
-        pairs[key.strip()] = value.strip()
+            raise ArgumentTypeError(
+                f"{item!r} is not of the form NAME=VALUE; a value with a comma stands in quotation "
+                'marks, NAME="VALUE"'
+            )
+        value = value.strip()
+        quoted = len(value) > 1 and value[0] == value[-1] == '"'
+        pairs[key.strip()] = value[1:-1] if quoted else value
     return pairs
 
 
