@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from jaxfric.data import io
-from jaxfric.data.columns import assign, describe
+from jaxfric.data.columns import assign, describe, units
 
 DATA = Path(os.environ.get("JAXFRIC_DATA", Path(__file__).parents[2] / "shared" / "data"))
 needs_data = pytest.mark.skipif(
@@ -186,6 +186,54 @@ def test_matlab_structures_matrices_and_scalars(tmp_path):
 )  # fmt: skip
 def test_names(name, role, unit):
     assert describe(name) == (role, unit)
+
+
+@pytest.mark.parametrize(
+    "name, role, unit",
+    [
+        ("PX[cnt]", "position", "counts"), ("VX[cnt/sec]", "velocity", "counts/s"),
+        ("px", None, None), ("Active Current [A]", "force", "A"),
+        ("pos_estimate", "position", None), ("vel_estimate", "velocity", None),
+        ("PL.FB (deg)", "position", "deg"), ("VL.FB (rpm)", "velocity", "rpm"),
+        ("IL.FB (Arms)", "force", "A"), ("IL.CMD (Arms)", None, None),
+        ("r0063[0]", "velocity", None), ("DO1.r63 Actual speed [rpm]", "velocity", "rpm"),
+        ("DO1.r62[0] Speed setpoint", None, None), ("r0080 Drehmomentistwert [Nm]", "force", "N·m"),
+        ("r0482[0] Geberlageistwert", "position", "counts"), ("r80", None, None),
+        ("6064h", "position", None), ("0x606C:00", "velocity", None), ("6064", None, None),
+        ("6077h", "force", "‰"), ("6077h torque actual value", "force", "‰"),
+        ("6077h [Nm]", "force", "N·m"), ("0x6077 [0.1%]", "force", "‰"),
+        ("S-0-0051 Lageistwert [mm]", "position", "mm"), ("S-0-0084", "force", None),
+        ("Axis 1.ActVelo [mm/s]", "velocity", "mm/s"), ("Position actual value", "position", None),
+        ("%time", "time", None), ("field.position0", "position", None),
+        ("field.effort0", "force", None), ("/joint_states/elbow/effort", "force", None),
+        ("/joint_states/header/stamp", "time", None), ("s actual [mm]", None, None),
+    ],
+)  # fmt: skip
+def test_names_of_makers(name, role, unit):
+    assert describe(name) == (role, unit)
+
+
+def test_parts_of_a_rated_torque_are_no_newton_metres():
+    assert units({"force": "6077h", "position": "6064h"}, {}, {}) == {"force": "‰"}
+
+
+def test_a_measured_signal_goes_before_its_estimate():
+    assert assign(["t", "q", "tau", "tau_est"], None, "log")["force"] == "tau"
+    assert assign(["t", "q", "tau_est"], None, "log")["force"] == "tau_est"
+
+
+def test_a_commanded_force_is_named_where_none_is_measured():
+    with pytest.raises(ValueError, match="no column is recognised as force") as caught:
+        assign(["Time[ms]", "Feedback Speed[min-1]", "Torque Reference[%]"], None, "log")
+    assert "--columns 'force=Torque Reference[%]'" in str(caught.value)
+
+
+def test_columns_that_are_not_used_are_told(tmp_path):
+    path = save(tmp_path / "log.csv", log() | {"s actual": log()["force"]})
+    assert io.read_with_notes(path, served=True)[1][0].endswith("Not used: s actual.")
+    more = log() | {f"channel {i}": log()["force"] for i in range(20)}
+    said = io.read_with_notes(save(tmp_path / "more.csv", more), served=True)[1][0]
+    assert said.endswith("channel 11 and 8 more.")
 
 
 def test_what_is_wanted_is_never_the_force():

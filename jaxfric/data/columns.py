@@ -5,9 +5,11 @@ for a role are an error, and a unit in a name is reported or refused but never c
 """
 
 import re
+import shlex
 from collections.abc import Iterable, Mapping
 
 from ..units import SI
+from . import makers
 from .languages import PARTICLES, english, plain
 from .nearest import meant
 from .printable import listed
@@ -22,8 +24,8 @@ ROLES = (
 _SYNONYMS = {
     "time": "time times t timestamp tstamp elapsed elapsedtime seconds sec",
     "position": "position pos q qm q_m x angle theta displacement encoder enc qpos jointangle "
-    "angularposition rotorposition",
-    "velocity": "velocity vel v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
+    "angularposition rotorposition encoderposition",
+    "velocity": "velocity vel velo v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
     "angularvelocity angularspeed thetadot dtheta rpm",
     "force": "force torque tau current u vir effort moment thrust f i iq i_q qaxiscurrent "
     "controleffort",
@@ -33,10 +35,18 @@ _SYNONYMS = {
     "segment": "segment seg segmentid segmentindex run runid trial episode",
 }
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
-_MEASURED = frozenset("measured meas actual act feedback fb motor joint axis drive".split())
+_MEASURED = frozenset(
+    "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
+    "drive".split()
+)
+# Of a signal that is measured, too, its estimate is not needed.
+_ESTIMATED = frozenset({"estimate", "estimated", "est"})
 _WANTED = frozenset(
     "desired des reference ref setpoint sp set command commanded cmd target demand goal".split()
 )
+
+# Of the columns that are not used so many are told.
+TOLD = 12
 
 _BRACKETS = re.compile(r"[\[({]([^\])}]*)[\])}]")
 # What stands in a bracket beside units: which signal it is.
@@ -47,7 +57,9 @@ _REMARK = re.compile(
 
 
 def _words(name: str) -> list[str]:
-    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", plain(name).rsplit(".", 1)[-1])
+    """The words of a name without its brackets and its maker's code, in English."""
+    name = _BRACKETS.sub(" ", makers.named(plain(name)))
+    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.rsplit(".", 1)[-1])
     words = [word for word in re.split(r"[^\w°%]+|_+", name.lower()) if word]
     words = [word for word in words if word not in PARTICLES] or words
     return [each for word in words for each in english(word)]
@@ -71,9 +83,8 @@ def _role_of_words(words: list[str]) -> str | None:
 
 def describe(name: str) -> tuple[str | None, str | None]:
     """The role that a column's name stands for and the unit that it states, each or `None`."""
-    name = plain(name)
-    bracket = _BRACKETS.search(name)
-    words = _words(_BRACKETS.sub(" ", name))
+    bracket = _BRACKETS.search(makers.named(plain(name)))
+    words = _words(name)
     if (role := _role_of_words(words)) is not None:
         stated = bracket[1] if bracket else "rpm" if words[-1:] == ["rpm"] else ""
         return role, unit_of(stated, role)
@@ -94,15 +105,21 @@ def stated_unit(name: str, role: str) -> str | None:
     own, unit = describe(name)
     if own == role:
         return unit
-    if bracket := _BRACKETS.search(name):
+    if bracket := _BRACKETS.search(makers.named(name)):
         return unit_of(bracket[1], role)
     words = _words(name)
     tails = ("_".join(words[-tail:]) for tail in (3, 2, 1) if len(words) > tail)
     return next((u for t in tails if len(t) > 1 and (u := unit_of(t, role))), None)
 
 
-def served(chosen: Mapping[str, str], scale: Mapping[str, float], named: Mapping[str, str]) -> str:
-    """Which column serves as what, the factors, and the units that nothing names.
+def served(
+    chosen: Mapping[str, str],
+    scale: Mapping[str, float],
+    named: Mapping[str, str],
+    names: Iterable[str],
+) -> str:
+    """Which column serves as what, the factors, the units that nothing names, and what of the
+    file's `names` is not used.
 
     `named`: the units of force and position that are [given or stated][jaxfric.data.columns.units].
     """
@@ -116,14 +133,16 @@ def served(chosen: Mapping[str, str], scale: Mapping[str, float], named: Mapping
     default = " and ".join(f"{role} as {SI[role]}" for role in taken)
     option = ",".join(f"{role}=UNIT" for role in taken)
     said = f"Columns: {', '.join(pieces)}."
-    return said + f" No unit is named: {default} (else --units {option})." * bool(taken)
+    said += f" No unit is named: {default} (else --units {option})." * bool(taken)
+    others = [repr(n)[1:-1] for n in names if n not in chosen.values()]
+    return said + f" Not used: {listed(others, TOLD)}." * bool(others)
 
 
 def unknown_units(chosen: Mapping[str, str], scale: Mapping[str, float]) -> list[str]:
     """A sentence for each bracket in the name of a needed column that is no unit of it."""
     sentences = []
     for role, name in chosen.items():
-        bracket = _BRACKETS.search(name)
+        bracket = _BRACKETS.search(makers.named(name))
         if role not in FITTING or scale.get(role) is not None or not bracket:
             continue
         text = bracket[1].strip()
@@ -174,11 +193,13 @@ def assign(
         role = describe(name)[0]
         if role and role not in columns and name not in chosen.values():
             candidates.setdefault(role, []).append(name)
-    for role, found in candidates.items():
+    for role, several in candidates.items():
+        found = [name for name in several if not _ESTIMATED & set(_words(name))] or several
         if len(found) > 1:
             raise ValueError(
                 f"{source}: {len(found)} columns could be the {role}: {listed(found)}. "
-                f"Say which: --columns {role}={found[0]} (columns={{{role!r}: {found[0]!r}}})."
+                f"Say which: --columns {_option(role, found[0])} "
+                f"(columns={{{role!r}: {found[0]!r}}})."
             )
         chosen[role] = found[0]
     if set_point and "time" in chosen and {"reference", "position", "force"} & set(chosen):
@@ -210,7 +231,30 @@ def _check_needed(chosen: Mapping[str, str], names: list[str], source: str) -> N
         raise ValueError(
             f"{source}: no column is recognised as {' nor as '.join(wanted)}. The columns are: "
             f"{listed(names)}. Name them: --columns {example}.{clock}"
+            + ("" if "force" in chosen else _commanded(names))
         )
+
+
+def _option(role: str, name: str) -> str:
+    """The option's value that names a column, fit for a shell."""
+    value = f'{role}="{name}"' if "," in name else f"{role}={name}"
+    return value if value.replace('"', "").isidentifier() else shlex.quote(value)
+
+
+def _commanded(names: Iterable[str]) -> str:
+    """What to do with the one column that holds the commanded force."""
+    found = []
+    for name in names:
+        words = _words(name)
+        rest = [word for word in words if word not in _WANTED]
+        if len(rest) < len(words) and _role_of_words(rest) == "force":
+            found.append(name)
+    if len(found) != 1:
+        return ""
+    return (
+        f" {found[0]!r} is the commanded force; where the drive gives what it is told, that will "
+        f"do: --columns {_option('force', found[0])}."
+    )
 
 
 def units(

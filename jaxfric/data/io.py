@@ -95,7 +95,7 @@ def read_with_notes(
 ) -> tuple[Recording, list[str]]:
     """[`read`][] together with one plain sentence for each thing that was put in order.
 
-    With `served` the first sentence says which column serves as what.
+    With `served` the first sentence says which column serves as what, and which are not used.
 
     With `set_point` the file may hold what an axis should do instead of what it did: time and a
     reference, a position or a force are enough, and a force that is absent is zero.
@@ -105,6 +105,7 @@ def read_with_notes(
     path, source = Path(path), encodable(os.fspath(path))
     scale, units, period = dict(scale or {}), dict(units or {}), dict(period or {})
     table = load(path, format)
+    own = list(table.columns)
     if rate is not None:
         table = clocked(table, rate, columns, source)
         columns = dict(columns or {}) | {"time": CLOCK}
@@ -116,7 +117,7 @@ def read_with_notes(
     named = names.units(chosen, scale, units)
     time, counted, in_seconds = _time(table, chosen, scale, path)
     scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
-    notes = [names.served(chosen, scale, named)] if served else []
+    notes = [names.served(chosen, scale, named, own)] if served else []
     notes += table.notes + names.unknown_units(chosen, scale) + counted
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)

@@ -12,6 +12,7 @@ _WORDS = {
     "timestamp": "zeitstempel horodatage 时间戳 タイムスタンプ",
     "position": "position lage weg 位置",
     "angle": "winkel 角度",
+    "encoder": "geber",
     "displacement": "verschiebung deplacement 位移 変位",
     "velocity": "geschwindigkeit drehzahl vitesse 速度 转速 轉速 回転速度 回転数 角速度",
     "force": "kraft effort 力 推力",

@@ -36,11 +36,11 @@ def json_text(text: str) -> str:
     return "".join(c if c == "\n" or not _unseen(c) else json.dumps(c)[1:-1] for c in text)
 
 
-def listed(names: Iterable[str]) -> str:
+def listed(names: Iterable[str], most: int = MOST) -> str:
     """Names, the first of many, each no longer than a message can bear; or `none`."""
     names = list(names)
-    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
-    return (", ".join(map(short, names[:MOST])) or "none") + more
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return (", ".join(map(short, names[:most])) or "none") + more
 
 
 def short(text: str) -> str:

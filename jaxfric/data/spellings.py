@@ -28,7 +28,7 @@ _SPELLINGS = {
     "N·m": "n·m n*m n.m n-m n_m n⋅m newtonmeter newtonmeters newtonmetre newtonmetres",
     "mN·m": "mnm mn·m mn*m", "µN·m": "unm µnm μnm", "kN·m": "knm kn·m kn*m",
     "N·cm": "ncm n·cm n*cm", "lbf·ft": "lbf·ft lbf*ft lbfft ftlb ft-lb ftlbf", "lbf·in": "lbf·in "
-    "lbf*in lbfin inlb in-lb inlbf", "%": "% percent prozent", "‰": "‰ permille promille",
+    "lbf*in lbfin inlb in-lb inlbf", "%": "% percent prozent", "‰": "‰ permille promille 0.1%",
     "rpm": "rpm upm 1/min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min umdrehungen/min r/min "
     "rev/min revs/min revolutions/min 1/minute u_min umdr_min r_min rev_min 1_min",
     "m/s": "mps", "rev/s": "hz rps u/s umdr/s",
