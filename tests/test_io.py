@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from jaxfric.data import io
 from jaxfric.data.columns import assign, describe, units
+from jaxfric.data.tables import load
 
 DATA = Path(os.environ.get("JAXFRIC_DATA", Path(__file__).parents[2] / "shared" / "data"))
 needs_data = pytest.mark.skipif(
@@ -111,6 +112,34 @@ def test_csv_spellings(tmp_path, kind):
     np.testing.assert_array_equal(recording.position, columns["position"])
     np.testing.assert_array_equal(recording.force, columns["force"])
     assert len(notes) == (kind == "cut off")
+
+
+ROWS = "".join(f"{i};{i % 7},5;{i % 3}\n" for i in range(40))
+
+
+@pytest.mark.parametrize(
+    "head, names, notes",
+    [
+        ("t;x;f\nms;mm;N\n", ["t [ms]", "x [mm]", "f [N]"], []),
+        ("t;x;f\n[s];;[A]\n", ["t [s]", "x", "f [A]"], []),
+        ("Name;Scope\nFile;a.svdx\n\nt;x;f\n", ["t", "x", "f"], ["2 lines above"]),
+        ("Scope YT, 3 channels\nt;x;f\ns;mm;N\n", ["t [s]", "x [mm]", "f [N]"], ["1 line above"]),
+        (";x;\n", ["column1", "x", "column3"], []),
+        ("# a comment\nt;x;f\n", ["t", "x", "f"], []),
+    ],
+)
+def test_heads_of_tables(tmp_path, head, names, notes):
+    (tmp_path / "log.csv").write_text(head + ROWS)
+    table = load(tmp_path / "log.csv")
+    assert list(table.columns) == names
+    assert table.columns[names[1]][:2].tolist() == [0.5, 1.5]
+    assert table.first_row == head.count("\n") + 1
+    assert [note[: len(want)] for note, want in zip(table.notes, notes, strict=True)] == notes
+
+
+def test_a_text_among_the_numbers_is_no_head(tmp_path):
+    (tmp_path / "log.csv").write_text("t;x;f\n0;off;1\n" + ROWS)
+    assert list(load(tmp_path / "log.csv").columns) == ["t", "x", "f"]
 
 
 def test_arrow_and_plain_csv_agree(tmp_path, monkeypatch):

@@ -3,12 +3,13 @@
 import csv
 import re
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import heading
+from .heading import Dialect
 from .printable import short
 
 # Importing pyarrow takes about as long as NumPy takes for a file of this size, so smaller files
@@ -16,9 +17,6 @@ from .printable import short
 _SMALL_CSV = 5_000_000  # bytes
 # Of a file so much is read for its header, and so much of its lines is held at once, bytes.
 _HEAD, _BLOCK = 65536, 1 << 24
-_DELIMITERS = ",;\t|"
-# Ten thousand columns with names of a hundred characters.
-_LONGEST_LINE = 1_000_000
 # Numbers with a point, with a comma, and with more than a decimal sign.
 _EXPONENT = r"(?:[eE][-+]?\d+)?"
 _POINT = r"[-+]?(?:\d+\.\d*|\.\d+)" + _EXPONENT
@@ -35,68 +33,6 @@ class Table(NamedTuple):
     columns: dict[str, np.ndarray]
     first_row: int
     notes: list[str]
-
-
-class _Dialect(NamedTuple):
-    header: list[str]
-    first: int  # lines before the first sample
-    delimiter: str | None  # None: blanks
-    decimal: str
-
-
-def _split(line: str, delimiter: str | None) -> list[str]:
-    if delimiter is None:
-        return line.split()
-    # A quotation mark that stays open is found where the rows are read.
-    with suppress(csv.Error):
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
-    return [cell.strip() for cell in line.split(delimiter)]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(",", "."))
-    except ValueError:
-        return False
-    return True
-
-
-def _dialect(lines: list[str], path: Path) -> _Dialect:
-    """Header, delimiter and decimal sign, from the first lines; `#` starts a comment."""
-    rows = [i for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
-    if not rows:
-        raise ValueError(f"{path}: the file holds no samples.")
-    top = lines[rows[0]]
-    if len(top) > _LONGEST_LINE:
-        raise ValueError(
-            f"{path}: row {rows[0] + 1} has {len(top)} characters, more than any row of a log. Is "
-            "this text, with a line for each sample?"
-        )
-    delimiter = max(_DELIMITERS, key=top.count)
-    delimiter = delimiter if delimiter in top else None
-    cells = _split(top, delimiter)
-    data = rows[1] if len(rows) > 1 else rows[0]
-    number = re.compile(r"^\s*[-+]?\d+,\d+")
-    decimal = "," if delimiter in (";", "\t", None) and any(
-        number.match(cell) for cell in _split(lines[data], delimiter)
-    ) else "."  # fmt: skip
-    if not all(_is_number(cell) for cell in cells):
-        return _Dialect(unique(cells), rows[0] + 1, delimiter, decimal)
-    comment = lines[rows[0] - 1].lstrip("# ") if rows[0] else ""
-    header = _split(comment, delimiter)
-    if len(header) != len(cells):
-        header = [f"column{i + 1}" for i in range(len(cells))]
-    return _Dialect(unique(header), rows[0], delimiter, decimal)
-
-
-def unique(names: list[str]) -> list[str]:
-    """Names with repeats numbered, `x` and `x (2)`: as synonyms they stay ambiguous."""
-    seen: dict[str, int] = {}
-    result = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        result.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return result
 
 
 def _decode(raw: bytes) -> str:
@@ -117,10 +53,11 @@ def read_csv(path: Path) -> Table:
     large = path.stat().st_size > _SMALL_CSV
     if not (large and end):
         raw = path.read_bytes()
-    dialect = _dialect(_decode(raw[:end] if end else raw).splitlines(), path)
-    notes: list[str] = []
+    dialect = heading.dialect(_decode(raw[:end] if end else raw).splitlines(), path)
+    notes = list(dialect.notes)
     if dialect.delimiter != "," and _holds(path, b","):  # a quoted cell is located as no number
-        decimal, notes = _signs(_parts(path, dialect.first), dialect, path)
+        decimal, told = _signs(_parts(path, dialect.first), dialect, path)
+        notes += told
         dialect = dialect._replace(decimal=decimal)
     table = None
     if large and dialect.delimiter and not _open_quotation(path):
@@ -158,7 +95,7 @@ def _open_quotation(path: Path) -> bool:
     return any(line.count(b'"') % 2 for block in quoted for line in block.splitlines())
 
 
-def _arrow_csv(path: Path, dialect: _Dialect) -> Table | None:
+def _arrow_csv(path: Path, dialect: Dialect) -> Table | None:
     """A large file by pyarrow; `None` where that is absent or the plain reader must explain."""
     try:
         import pyarrow as pa
@@ -182,7 +119,7 @@ def _arrow_csv(path: Path, dialect: _Dialect) -> Table | None:
     return Table(columns, dialect.first + 1, [])
 
 
-def _plain_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
+def _plain_csv(lines: list[str], dialect: Dialect, path: Path) -> Table:
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
@@ -190,9 +127,7 @@ def _plain_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
     return _regular_csv(lines, dialect) or _any_csv(lines, dialect, path)
 
 
-def _signs(
-    parts: Iterable[tuple[int, str]], dialect: _Dialect, path: Path
-) -> tuple[str, list[str]]:
+def _signs(parts: Iterable[tuple[int, str]], dialect: Dialect, path: Path) -> tuple[str, list[str]]:
     """The decimal sign, and a warning where each comma could as well separate thousands.
 
     **Arguments:** `parts`, lines of the file with the number of the first of them, from 0.
@@ -231,7 +166,7 @@ def _signs(
     return "," if comma else ".", []
 
 
-def _regular_csv(lines: list[str], dialect: _Dialect) -> Table | None:
+def _regular_csv(lines: list[str], dialect: Dialect) -> Table | None:
     """A file of nothing but numbers, quickly; `None` where it is anything else."""
     if dialect.decimal == ",":
         lines = [line.replace(",", ".") for line in lines]
@@ -244,7 +179,7 @@ def _regular_csv(lines: list[str], dialect: _Dialect) -> Table | None:
     return Table(dict(zip(dialect.header, values.T, strict=True)), dialect.first + 1, [])
 
 
-def _any_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
+def _any_csv(lines: list[str], dialect: Dialect, path: Path) -> Table:
     width, notes = len(dialect.header), []
     if dialect.delimiter is None:
         rows = [line.split() for line in lines]
@@ -262,7 +197,7 @@ def _any_csv(lines: list[str], dialect: _Dialect, path: Path) -> Table:
     return Table(columns, dialect.first + 1, notes)
 
 
-def _quoted(lines: list[str], dialect: _Dialect, path: Path) -> list[list[str]]:
+def _quoted(lines: list[str], dialect: Dialect, path: Path) -> list[list[str]]:
     """The cells of each line.
 
     **Raises:** `ValueError` where a quotation mark is open at the end of a line: what would be one

@@ -56,6 +56,11 @@ FITTING = {
 }
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of any signal."""
+    return any(unit_of(text, role) for role in FITTING)
+
+
 def unit_of(text: str, role: str) -> str | None:
     """The unit that a suffix or a bracket spells, or `None` where it is none that fits the role."""
     unit = spelt(text, role)

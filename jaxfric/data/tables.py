@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from . import bags, vectors
-from .delimited import Table, arrow_column, read_csv, unique
+from .delimited import Table, arrow_column, read_csv
+from .heading import unique
 
 
 def optional(library: str, path: Path) -> Any:
