@@ -166,3 +166,18 @@ def test_the_slow_motor_and_the_ramps_of_the_servo_have_none(data_folder):
     assert any("varied by" in gap.reason for gap in test.not_evaluated)
     servo = jf.constant_velocity(jf.read(data_folder / "delta_servo" / "S1_1.csv"))
     assert not servo.points and len(servo.not_evaluated) == 2
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_of_one_speed_the_mean_force_is_told(noise):
+    rng, t = np.random.default_rng(0), np.arange(4000) / 1000
+    v = 0.05 + noise * rng.normal(size=t.size)
+    log = jf.Recording(t, bumped(v) + 0.1 * rng.normal(size=t.size), 0.05 * t, v)
+    found = jf.identify("coulomb-viscous", log)
+    assert found.result_name == "not_excited"
+    assert not np.isfinite(found.parameters["inertia"].standard_error)
+    (point,) = jf.constant_velocity(log, found).points
+    assert point.low < bumped(0.05) < point.high and point.seconds > 3
+    if not noise:
+        said = sentence(jf.constant_velocity(log, found), {"force": "N", "position": "m"})
+        assert "the mean force is 12.01 ± 0.0" in said and "at 0.05 m/s." in said

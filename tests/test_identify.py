@@ -233,6 +233,7 @@ def test_bounds_hold_and_the_border_is_reported():
     bounds = {"stribeck_velocity": (0.05, 0.09)}
     found = jf.identify("gaussian", log, bounds=bounds)
     assert result_names()[int(found.result._value)] == "on_border"
+    assert "On its border: stribeck_velocity+, stribeck_velocity-." in found.diagnosis
     for sign in "+-":
         value = float(found.parameters[f"stribeck_velocity{sign}"].value)
         assert 0.05 * (1 - 1e-12) <= value <= 0.09 * (1 + 1e-12)
@@ -376,3 +377,20 @@ def test_a_force_of_the_wrong_sign_is_no_load():
     run = recording(machine("coulomb-viscous"), noise=0.1)
     found = jf.identify("coulomb-viscous", dataclasses.replace(run, force=-run.force))
     assert [remark.name for remark in found.remarks] == ["negative_parameter"]
+
+
+def test_a_direction_that_never_moved_is_named():
+    run = recording(machine(), noise=0.05)
+    kept = np.asarray(run.velocity) > 0
+    forward = dataclasses.replace(run, mask=kept, segment=np.cumsum(np.diff(kept, prepend=0) != 0))
+    found = jf.identify("gaussian", dataclasses.replace(forward, num_segments=None))
+    assert found.result_name == "not_excited"
+    names = "coulomb-, viscous-, stribeck_force-, stribeck_velocity-"
+    assert f"Not determined: {names}." in found.diagnosis
+
+
+def test_an_offset_beside_friction_of_each_direction_is_told():
+    run = recording(machine("coulomb-viscous"), noise=0.1)
+    found = jf.identify(jf.models.coulomb_viscous() + jf.terms.Offset(), run)
+    assert "No motion tells offset from coulomb+ and coulomb-" in found.diagnosis
+    assert "Move in both directions" not in found.diagnosis

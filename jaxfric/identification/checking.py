@@ -90,14 +90,26 @@ def checked(
         counted = [k for k in passive if not (loaded and names[k].startswith("coulomb"))]
         if negative := int(np.sum((alpha + half)[counted] < 0)):
             warnings[i, checks.NAMES.index("negative_parameter")] = negative
+        if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
+            # What accelerates the axis there is noise.
+            k = names.index("inertia")
+            if not abs(alpha[k]) > half[k]:
+                matrices[i, k, k], alphas[i, k] = np.inf, np.nan
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
     warnings = warnings.reshape(faults.shape).astype(np.asarray(found.filtered_force_error).dtype)
+    hidden = np.isinf(np.diagonal(matrices, axis1=1, axis2=2)).any(axis=1)
+    flat = (hidden & ~np.isnan(warnings[..., ONE_SPEED].ravel())).reshape(wrong.shape)
+    model = found.model
+    if np.isnan(alphas).any():
+        alpha = jnp.asarray(alphas.reshape(model.alpha.shape), model.alpha.dtype)
+        model = dataclasses.replace(model, alpha=alpha)
     return dataclasses.replace(
         found,
+        model=model,
         covariance=jnp.asarray(matrices.reshape(found.covariance.shape), found.covariance.dtype),
         warnings=jnp.asarray(warnings),
-        result=_contradicted(found.result, wrong),
+        result=_contradicted(_unexcited(found.result, flat), wrong),
     )
 
 
@@ -130,11 +142,19 @@ def _by_lateness(late: checks.Lateness, interval: float, delayed: bool, count: i
     return found
 
 
-STRUCTURE = checks.NAMES.index("structure_left")
+STRUCTURE, ONE_SPEED = (checks.NAMES.index(name) for name in ("structure_left", "one_speed"))
 
 
 # What says more than that signals contradict each other.
 _PLAINER = ("not_finite", "no_slip", "open_windows")
+
+
+def _unexcited(result: Result, flat: np.ndarray) -> Result:
+    """The result where one speed alone is the reason that a bump lies anywhere in its bounds."""
+    border, unexcited = (result_names().index(name) for name in ("on_border", "not_excited"))
+    own = np.asarray(result._value)
+    number = np.where(flat & (own == border), unexcited, own)
+    return eqx.tree_at(lambda r: r._value, result, jnp.asarray(number, result._value.dtype))
 
 
 def _contradicted(result: Result, wrong: np.ndarray) -> Result:

@@ -1,5 +1,6 @@
 """A constant load that friction of each direction has taken up, as of a vertical axis."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,4 +60,14 @@ def remark(found: Any) -> Remark | None:
         f"coulomb+ and coulomb- are {values}: a constant load, as of a weight ({split}), or "
         f"friction that differs by direction. {other} the load as offset.",
         False,
+    )
+
+
+def twice(hidden: Sequence[str]) -> str:
+    """Why a load is not determined beside friction of each direction, where it is that alone."""
+    if set(hidden) != {"offset", "coulomb+", "coulomb-"}:
+        return ""
+    return (
+        "No motion tells offset from coulomb+ and coulomb-, half of whose difference is such a "
+        "force: leave Offset() out, or tie the directions (symmetric-gaussian has an offset)."
     )

@@ -57,6 +57,9 @@ class Point(NamedTuple):
     contradicts: bool = False
 
 
+# So many means are told where there is no curve.
+TOLD = 4
+
 # The reason where nothing was tried.
 NONE_THERE = "no stretch of constant velocity there"
 
@@ -281,11 +284,21 @@ def sentence(test: ConstantVelocity, units: dict[str, str]) -> str:
     if not test.points and not test.not_evaluated:
         return ""
     speed = spell(VELOCITY, units)
-    count, wrong = len(test.points), len(test.contradicted)
-    if not count:
+    if not test.points:
         tried = [g.reason for g in test.not_evaluated if g.reason != NONE_THERE]
         reason = tried[0] if tried else "none was held long enough"
         return f"Constant-velocity test: no speed could be evaluated; {reason}."
+    wrong = len(test.contradicted)
+    compared = [p for p in test.points if np.isfinite(p.curve) and p.curve_high > p.curve_low]
+    if not compared:
+        means = ", ".join(
+            f"{p.force:.4g} ± {0.5 * (p.high - p.low):.2g} {units['force']} at {p.velocity:.3g} "
+            f"{speed}"
+            for p in test.points[:TOLD]
+        )
+        more = f" and at {len(test.points) - TOLD} more speeds" * (len(test.points) > TOLD)
+        return f"Constant-velocity test: the mean force is {means}{more}."
+    count = len(compared)
     agree = f"{count - wrong} of {count} speeds agree" if wrong else f"all {count} speeds agree"
     if count == 1:
         agree = "the one speed disagrees" if wrong else "the one speed agrees"

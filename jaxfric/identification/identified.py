@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .. import checks
 from ..checks import Remark
@@ -31,8 +31,8 @@ class Result(eqx.Enumeration):
 
     successful = "The parameters were identified."
     on_border = (
-        "The cost is least on the border of a nonlinear parameter's bounds, so that parameter is "
-        "not determined. Excite slower motion (the Stribeck velocity must lie well inside the "
+        "The cost is least on the border of a nonlinear parameter's bounds, so that this parameter "
+        "is not determined. Excite slower motion (the Stribeck velocity must lie well inside the "
         "speeds that the axis slips at), give bounds, or use a model without the bump."
     )
     not_converged = (
@@ -103,6 +103,7 @@ class Identified(eqx.Module):
       `(W,)`; all NaN inside `jax.jit`, where the signals have no values yet.
     - `rival`: the nonlinear parameters of another minimum that the data do not tell from the one
       reported, `(d,)`; NaN where there is none.
+    - `border`: which nonlinear parameters lie on the border of their bounds, `(d,)`.
     """
 
     model: Model
@@ -116,6 +117,7 @@ class Identified(eqx.Module):
     projection: str = eqx.field(static=True)
     rival: Float[Array, " d"] | None = None
     warnings: Float[Array, " W"] = eqx.field(default_factory=checks.none)
+    border: Bool[Array, " d"] | None = None
 
     def __len__(self) -> int:
         if not np.ndim(self.result._value):
@@ -152,6 +154,10 @@ class Identified(eqx.Module):
             return f"{said} {float(self.filtered_force_error):.0%} of the force is left."
         if self.result_name == "ambiguous":
             return f"{said} The other one: {self._elsewhere()}."
+        if self.result_name == "on_border" and self.border is not None:
+            return f"{said} On its border: {self._on_border()}."
+        if self.result_name == "not_excited":
+            return self._not_determined(said)
         return said
 
     @property
@@ -167,6 +173,23 @@ class Identified(eqx.Module):
             f"{p.name} = {float(value):.6g} {spell(p.dimension, units)}".strip()
             for p, value in zip(searched, self.rival, strict=True)
         )
+
+    def _on_border(self) -> str:
+        """The parameters on the border of their bounds."""
+        names = [p.name for p in self.model.term.nonlinear]
+        return ", ".join(
+            n for n, there in zip(names, np.asarray(self.border), strict=True) if there
+        )
+
+    def _not_determined(self, said: str) -> str:
+        """What was `said` with the parameters that the recording does not show, and why not."""
+        known = np.isfinite(np.diagonal(np.asarray(self.covariance)))
+        hidden = [name for name, seen in zip(self.names, known, strict=True) if not seen]
+        if not hidden or len(hidden) == len(self.names):
+            return said
+        names = f"Not determined: {', '.join(hidden)}."
+        why = constant_load.twice(hidden)
+        return f"Condition (15) fails. {names} {why}" if why else f"{said} {names}"
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

@@ -196,6 +196,8 @@ def _assess(
     alpha = jnp.where(nothing, jnp.nan, alpha)
     matrix = jnp.where(nothing, jnp.inf, matrix)
     unseen = assessment.unseen(term, active, jacobian, weight) & jnp.isinf(jnp.diagonal(matrix))
+    # What acts in no row is anywhere in its bounds.
+    border = border & ~unseen[alpha.size :]
     known = jnp.where(unseen, jnp.nan, jnp.concatenate([alpha, beta.astype(alpha.dtype)]))
     model = Model(
         term.with_beta(known[alpha.size :].astype(beta.dtype)), known[: alpha.size], recording.units
@@ -213,7 +215,14 @@ def _assess(
         model,
         matrix,
         assessment.verdict(
-            finite, slipping, jnp.sum(weight) > 0, hidden, border, converged, ambiguous, odd
+            finite,
+            slipping,
+            jnp.sum(weight) > 0,
+            hidden,
+            jnp.any(border),
+            converged,
+            ambiguous,
+            odd,
         ),
         rows.windows,
         rows.covered,
@@ -223,6 +232,7 @@ def _assess(
         "weak_form" if projection.keeps_inertia else "closed_windows",
         jnp.where(ambiguous, rival, jnp.nan) if beta.size else None,
         jnp.full(len(checks.NAMES), jnp.nan, error.dtype),
+        border if beta.size else None,
     )
     return found, design
 

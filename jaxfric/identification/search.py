@@ -25,18 +25,23 @@ STRETCH = 8
 
 
 class Found(NamedTuple):
-    """The nonlinear parameters β `(d,)`, whether the refinement converged, and whether β lies on
-    the border of its bounds; where nodes say them too, with no derivative: `alpha`, the affine
+    """The nonlinear parameters β `(d,)`, whether the refinement converged, and which of them lie on
+    the border of their bounds; where nodes say them too, with no derivative: `alpha`, the affine
     parameters `(p,)`, and `minimum`, the cost of the samples there, N²·s, infinite where they do
     not agree.
     """
 
     beta: Float[Array, " d"]
     converged: Bool[Array, ""]
-    on_border: Bool[Array, ""]
+    border: Bool[Array, " d"]
     alpha: Float[Array, " p"] | None = None
     minimum: Float[Array, ""] | None = None
     rival: Float[Array, " d"] | None = None
+
+    @property
+    def on_border(self) -> Bool[Array, ""]:
+        """Whether any parameter lies on the border of its bounds."""
+        return jnp.any(self.border)
 
 
 def _sides(term: AbstractTerm):
@@ -67,7 +72,7 @@ def search(
     """
     if not term.nonlinear:
         yes = jnp.ones((), bool)
-        return Found(jnp.zeros((0,), rows.target.dtype), yes, ~yes)
+        return Found(jnp.zeros((0,), rows.target.dtype), yes, jnp.zeros((0,), bool))
     logarithmic = tuple(p.logarithmic for p in term.nonlinear)
     problem = Problem(term, recording, rows, box, logarithmic, alike)
     frozen = jax.lax.stop_gradient(problem)
@@ -78,7 +83,7 @@ def search(
     unit, converged, minimum = jax.lax.stop_gradient(_refine(frozen, best))
     alpha = None if best.samples is None else _affine(frozen, best, unit)
     unit = _implicit(unit, problem)
-    border = jnp.any((unit <= 0) | (unit >= 1))
+    border = (unit <= 0) | (unit >= 1)
     return Found(reduced.decode(unit, box, logarithmic), converged, border, alpha, minimum)
 
 
@@ -86,7 +91,7 @@ def _staged(problem: Problem, frozen: Problem, plan: Plan) -> Found:
     """The same for several nonlinear terms, or for one that needs a fine grid."""
     found = jax.lax.stop_gradient(blocks.search(frozen, plan))
     unit = _implicit(found.unit, problem)
-    border = jnp.any((unit <= 0) | (unit >= 1))
+    border = (unit <= 0) | (unit >= 1)
     beta = reduced.decode(unit, problem.box, problem.logarithmic)
     return Found(beta, found.converged, border, rival=found.rival)
 

@@ -16,6 +16,8 @@ BAND = 0.05
 # Of a velocity that turns once, half lies between the two crossings of its median; of one that
 # passes through the band only what noise makes of its one crossing.
 LEAST_BETWEEN = 1 / 3
+# What varies in the seventh digit is a set-point or a rounding: its ends are equal.
+ROUNDED = 1e-6
 # Samples of a stretch: four for each of the cosines that tell how sure its mean is.
 FEWEST = 4 * COSINES
 # The mean velocity is held where so many neighbouring means, of no sample in common, agree.
@@ -63,7 +65,9 @@ def steady(log: Recording, force: np.ndarray, slowest: float) -> list[Stretch]:
         first, last = first + ends[0], first + ends[1]
         if last - first + 1 < FEWEST or taken[first : last + 1].any():
             continue
-        if _passes(time[first : last + 1], velocity[first : last + 1], usual):
+        # In a recording of one speed the usual acceleration is noise.
+        alone = 2 * (last - first + 1) > velocity.size
+        if not alone and _passes(time[first : last + 1], velocity[first : last + 1], usual):
             continue
         taken[first : last + 1] = True
         found.append(_measured(log, force, first, last))
@@ -164,7 +168,7 @@ def _runs(
 def _closed(velocity: np.ndarray) -> tuple[int, int] | None:
     """The first and the last crossing of the median; `None` where the velocity passes through."""
     above = velocity - np.median(velocity)
-    if not above.any():
+    if np.max(np.abs(above)) <= ROUNDED * abs(np.median(velocity)):
         return 0, velocity.size - 1
     crossing = np.flatnonzero((above[1:] * above[:-1] <= 0) & (above[1:] != above[:-1]))
     if crossing.size < 2 or crossing[-1] - crossing[0] < LEAST_BETWEEN * velocity.size:
