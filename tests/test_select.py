@@ -43,7 +43,7 @@ def test_the_right_shape_is_chosen(kind):
 def test_without_slow_motion_it_is_said_that_shapes_cannot_be_told():
     found = jf.select(machine("gaussian", 0, slow=False))
     assert found.name == "coulomb-viscous" and found.name in found.tied
-    assert "because no motion below" in found.reason
+    assert "because there is too little motion below" in found.reason
 
 
 @pytest.mark.slow

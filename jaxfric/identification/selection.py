@@ -108,7 +108,7 @@ def select(
     chosen = _chosen(found)
     speed = spell(VELOCITY, recording.unit_names)
     if len(chosen.tied) < 2:
-        return chosen._replace(reason=_unseen(chosen.name, standings.recorded(log), speed))
+        return chosen._replace(reason=_unseen(chosen.name, log, speed))
     curves = {name: together[name].curve for name in chosen.tied}
     return chosen._replace(reason=_reason(curves, log, speed, recording.unit_names["force"]))
 
@@ -136,14 +136,19 @@ def _half(held_out: np.ndarray, error: float) -> float:
     return float(0.5 * error * student_quantile(0.975, count - 1) * spread)
 
 
-def _unseen(name: str, slowest: float, speed: str) -> str:
+def _unseen(name: str, log: standings.Regression, speed: str) -> str:
     """What a model without a bump leaves open."""
     if not name.endswith("coulomb-viscous"):
         return ""
-    return (
-        f"whether there is a Stribeck bump below {slowest:.2g} {speed} cannot be told, because no "
-        "motion below that"
-    )
+    below, why = f"below {standings.recorded(log):.2g} {speed}", _slow_motion(log)
+    return f"whether there is a Stribeck bump {below} cannot be told, because {why} {below}"
+
+
+def _slow_motion(log: standings.Regression) -> str:
+    """Why friction below the slowest rows is not seen: the axis is not so slow, or not for long."""
+    speed = np.abs(log.speed)
+    brief = np.any((speed > log.slowest) & (speed < standings.recorded(log)))
+    return "there is too little motion" if brief else "there is no motion"
 
 
 def _reason(curves: Mapping[str, np.ndarray], log, speed: str, force: str) -> str:
@@ -156,8 +161,9 @@ def _reason(curves: Mapping[str, np.ndarray], log, speed: str, force: str) -> st
     names = ", ".join(curves)
     if below > 2 * within:
         return (
-            f"cannot tell these apart ({names}), because no motion below {slowest:.2g} {speed}: "
-            f"there their curves differ by up to {below:.2g} {force}, above by {within:.2g} at most"
+            f"cannot tell these apart ({names}), because {_slow_motion(log)} below {slowest:.2g} "
+            f"{speed}: there their curves differ by up to {below:.2g} {force}, above by "
+            f"{within:.2g} at most"
         )
     return (
         f"cannot tell these apart ({names}): over the speeds recorded their curves differ by "
