@@ -89,6 +89,22 @@ def test_a_velocity_in_another_unit_or_direction(factor, name, said):
     assert found[0].severe is (name != "velocity_gain")
 
 
+@pytest.mark.parametrize(("factor", "clock"), [(1e3, "ms"), (1e6, "µs")])
+def test_a_time_that_is_not_in_seconds(factor, clock):
+    sound = log()
+    (remark,) = checks.inspect(changed(sound, time=factor * sound.time))
+    assert remark.name == "time_scale" and remark.severe
+    assert f"({clock}?)" in remark.text and f"--scale time={1 / factor:.4g}." in remark.text
+
+
+def test_force_and_velocity_that_are_exchanged():
+    sound = log()
+    swapped = changed(sound, force=sound.velocity, velocity=3 * sound.force)
+    assert names(swapped)[0] == "force_is_velocity"
+    # A copy of the velocity beside the velocity is not exchanged with it.
+    assert names(changed(sound, force=sound.velocity)) == ["force_is_motion"]
+
+
 def test_a_velocity_of_another_axis_and_a_late_one():
     sound, other = log(), log(seed=5)
     assert names(changed(sound, velocity=other.velocity)) == ["velocity_unrelated"]

@@ -47,6 +47,20 @@ KINDS = (
         "--columns velocity= .",
     ),
     Kind(
+        "time_scale",
+        True,
+        "The position moves {value:.4g} times as fast as the velocity column says, with samples "
+        "further apart than a drive's: the time is not in s{guess}. Give --scale "
+        "time={value:.4g}.",
+    ),
+    Kind(
+        "force_is_velocity",
+        True,
+        "The force column is the position's derivative, within {value:.1%}, and the velocity "
+        "column is not: they are exchanged. Name each by the other's column: --columns "
+        "force=NAME,velocity=NAME.",
+    ),
+    Kind(
         "velocity_gain",
         False,
         "The position moves {value:.3g} times as fast as the velocity column says: its unit or its "
@@ -289,8 +303,13 @@ _FACTORS = {
 }
 
 
-def _guess(value: float) -> str:
-    near = [name for name, factor in _FACTORS.items() if abs(value / factor - 1) < 0.03]
+# Factors of clocks that are taken for seconds.
+_CLOCKS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
+
+
+def _guess(name: str, value: float) -> str:
+    factors = _CLOCKS if name == "time_scale" else _FACTORS
+    near = [name for name, factor in factors.items() if abs(value / factor - 1) < 0.03]
     return f" ({near[0]}?)" if near else ""
 
 
@@ -300,6 +319,6 @@ def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
     for kind, value in zip(KINDS, np.asarray(values, float), strict=True):
         if np.isnan(value):
             continue
-        text = kind.text.format(value=float(value), guess=_guess(float(value)), **units)
+        text = kind.text.format(value=float(value), guess=_guess(kind.name, float(value)), **units)
         found.append(Remark(kind.name, text, kind.severe))
     return tuple(sorted(found, key=lambda remark: not remark.severe))

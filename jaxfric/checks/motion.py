@@ -1,5 +1,7 @@
 """Faults that clock, position and velocity of a recording show by themselves, on the host."""
 
+import dataclasses
+
 import numpy as np
 
 from .. import signals
@@ -20,6 +22,8 @@ LATE = 0.002
 FASTEST = {"m": 50.0, "rad": 5e4}
 # A velocity that errs by half of its size is noise.
 NOISE_ONLY = 0.5
+# Of a motion that is sampled once in half a second no drive's friction can be told.
+SLOWEST_LOG = 0.5
 # Eight tenths of the means of the speed within a tenth of it leave friction's slope and the
 # acceleration to the noise.
 ONE_SPEED = 1.1
@@ -117,6 +121,8 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
         return {}
     shared, lag = _correlation(moved, driven)
     at_once = float(moved @ driven / np.sqrt((moved @ moved) * (driven @ driven)))
+    if (left := _exchanged(recording, moved, driven)) is not None:
+        return {"force_is_velocity": left}
     if abs(at_once) < SHARED**0.5:
         return {"velocity_unrelated": at_once**2}
     if shared < 0:
@@ -132,8 +138,23 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     gain = float(a @ a / (a @ b)) if a @ b else np.inf
     off = abs(np.log(gain)) if gain > 0 and np.isfinite(gain) else 0.0
     if off > np.log(ALIKE):
-        return {"velocity_scale": gain}
+        slow = clock.interval > SLOWEST_LOG and clock.interval * gain < SLOWEST_LOG
+        return {"time_scale" if slow else "velocity_scale": gain}
     return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
+
+
+def _exchanged(recording: Recording, moved: np.ndarray, driven: np.ndarray) -> float | None:
+    """What the force's integral leaves of the position, if next to nothing where the velocity's
+    leaves much, both taken as they are.
+    """
+    size, left = float(moved @ moved), float(np.sum((moved - driven) ** 2))
+    if left < (GAIN - 1) * size:
+        return None
+    other = signals.Increments.of(dataclasses.replace(recording, velocity=recording.force))
+    if other.driven.shape != other.moved.shape or not np.any(other.moved):
+        return None
+    left = float(np.sum((other.moved - other.driven) ** 2) / (other.moved @ other.moved)) ** 0.5
+    return left if left < GAIN - 1 else None
 
 
 def _correlation(moved: np.ndarray, driven: np.ndarray) -> tuple[float, int]:
