@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from jaxfric.data.recording import Recording, pad, stack
+from jaxfric.data.summary import facts
 
 
 def log(n=5, **signals):
@@ -162,3 +163,14 @@ def test_nothing_to_stack_is_refused():
 def test_recordings_that_differ_do_not_stack_and_the_odd_one_is_named(other):
     with pytest.raises(ValueError, match=r"number 2 \(odd\.csv\) has"):
         stack([log(), log(), log(source="odd.csv", **other)])
+
+
+def test_samples_left_out_have_their_place_in_the_clock():
+    t = np.arange(2000) / 1000
+    mask = np.arange(2000) % 100 > 2
+    log = Recording(t, np.ones(2000), t, mask=mask)
+    assert facts(pad(log, 2500))["sample_rate"] == pytest.approx(1000.0)
+    assert facts(pad(log, 2500))["used"] == mask.sum()
+    broken = Recording(np.concatenate([t, t]), np.ones(4000), np.concatenate([t, t]),
+                          mask=np.tile(mask, 2), segment=np.repeat([0, 1], 2000))  # fmt: skip
+    assert facts(broken)["sample_rate"] == pytest.approx(1000.0)

@@ -12,13 +12,21 @@ from .cleaning.pieces import some
 
 
 def facts(recording: Any, notes: Sequence[str] = ()) -> dict[str, Any]:
-    """File, samples, duration (s), mean sample rate (Hz) of a `Recording`, and what was tidied."""
+    """File, samples, duration (s), mean sample rate (Hz) of a `Recording`, and what was tidied.
+
+    A sample that is left out has its place in the clock.
+    """
     mask = np.asarray(recording.mask)
     time, segment = (some(np.asarray(x), mask) for x in (recording.time, recording.segment))
     changes = np.flatnonzero(segment[1:] != segment[:-1])
     first, last = np.append(0, changes + 1), np.append(changes, time.size - 1)
     first, last = first[: time.size], last[: time.size]
     count, duration = time.size - first.size, float(np.sum(time[last] - time[first]))
+    rate = count / duration if count else None
+    if rate and not mask.all():
+        steps, same = np.diff(recording.time), np.diff(recording.segment) == 0
+        steps = np.asarray(steps, float)[same & (steps > 0)]  # none where it is padded
+        rate = steps.size / float(np.sum(steps))
     return {
         "file": recording.source,
         "sha256": recording.sha256 or None,
@@ -26,7 +34,7 @@ def facts(recording: Any, notes: Sequence[str] = ()) -> dict[str, Any]:
         "used": int(np.count_nonzero(mask)),
         "segments": int(np.unique(segment[first]).size),
         "duration": duration,
-        "sample_rate": count / duration if count else None,
+        "sample_rate": rate,
         "notes": list(notes),
     }
 
