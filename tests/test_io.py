@@ -575,6 +575,7 @@ def test_damaged_files(tmp_path, suffix):
 def test_absent_file_unknown_format_and_unequal_columns(tmp_path):
     with pytest.raises(ValueError, match="no such file"):
         io.read(tmp_path / "log.csv")
+    (tmp_path / "log.xlsx").write_text("a")
     with pytest.raises(ValueError, match="'xlsx' is not known"):
         io.read(tmp_path / "log.xlsx")
     np.savez(tmp_path / "log.npz", t=np.arange(30.0), x=np.arange(31.0), f=np.arange(30.0))
@@ -583,6 +584,13 @@ def test_absent_file_unknown_format_and_unequal_columns(tmp_path):
 
 
 # ---- writing ----
+
+
+def test_a_folder_is_told_as_such(tmp_path):
+    with pytest.raises(ValueError, match=r"is a folder; name a file in it, .*jaxfric fleet"):
+        io.read(tmp_path)
+    with pytest.raises(ValueError, match="there is no such file"):
+        io.read(tmp_path / "nothing")
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path):

@@ -32,16 +32,19 @@ def load(path: Path, format: str | None = None) -> Table:
     suffix = (format or path.suffix).lower().lstrip(".")
     if path.is_dir() and bags.is_bag(path):
         suffix = bags.SUFFIXES[0]
+    elif path.is_dir():
+        raise ValueError(
+            f"{path}: is a folder; name a file in it, or identify all of them: "
+            f"jaxfric fleet '{path}/*.csv'."
+        )
+    if not path.is_file() and not bags.is_bag(path):
+        special = "is no regular file; save its content as one" if path.exists() else ""
+        raise ValueError(f"{path}: {special or 'there is no such file'}.")
     if suffix not in _LOADERS:
         raise ValueError(
             f"{path}: the format {suffix or '(no suffix)'!r} is not known. Known are "
             f"{', '.join(sorted(_LOADERS))}; name one with format=."
         )
-    if path.is_dir() and not bags.is_bag(path):
-        raise ValueError(f"{path}: is a folder; name a file in it.")
-    if not path.is_file() and not bags.is_bag(path):
-        special = "is no regular file; save its content as one" if path.exists() else ""
-        raise ValueError(f"{path}: {special or 'there is no such file'}.")
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty.")
     try:
