@@ -394,3 +394,25 @@ def test_an_offset_beside_friction_of_each_direction_is_told():
     found = jf.identify(jf.models.coulomb_viscous() + jf.terms.Offset(), run)
     assert "No motion tells offset from coulomb+ and coulomb-" in found.diagnosis
     assert "Move in both directions" not in found.diagnosis
+
+
+def unusable():
+    """Logs that nothing can be told from, each in its way."""
+    run = recording(machine("coulomb-viscous"), seconds=2.0)
+    t = np.asarray(run.time)
+    return {
+        "velocity is infinite": dataclasses.replace(run, velocity=run.velocity.at[5].set(jnp.inf)),
+        "force is infinite": dataclasses.replace(run, force=run.force.at[5].set(-jnp.inf)),
+        "clock runs backward": dataclasses.replace(run, time=t[::-1].copy()),
+        "clock stands": dataclasses.replace(run, time=0 * t),
+    }
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+def test_what_is_unusable_stays_in_its_row_without_a_word_of_numpy(velocity):
+    logs = [recording(machine("coulomb-viscous"), seconds=2.0, noise=0.1), *unusable().values()]
+    if not velocity:
+        logs = [dataclasses.replace(log, velocity=None) for log in logs]
+    found = jf.identify("coulomb-viscous", jf.stack(logs))  # a warning is an error here
+    assert found[0].result_name == "successful"
+    assert "successful" not in [row.result_name for row in found[2 if not velocity else 1 :]]

@@ -53,6 +53,7 @@ def jumps(recording: Recording, velocity: np.ndarray, clock: Clock) -> int:
 
 def coarse(recording: Recording, velocity: np.ndarray, clock: Clock) -> dict[str, float]:
     """Samples a cycle of a recorded velocity, at the root mean square of its frequency, if few."""
+    velocity = np.where(np.isfinite(velocity), velocity, np.nan)
     step, speed = np.diff(velocity)[clock.linked], velocity[np.asarray(recording.mask)]
     power, size = np.nanmean(step**2) if len(step) else 0.0, np.nanmean(speed**2)
     if not power > 0 or not size > 0:

@@ -87,7 +87,7 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
             bias = max(own[i], least[degree])
             least[degree] = max(least[degree], sure[i])
             tried.append((bias + noise**2 * level.rough[i], bias, degree, width))
-    if not tried:
+    if not tried or not log.step > 0:  # too short, or a clock that stands
         return Choice(DEGREES[0], HALF_WIDTHS[0], noise=noise)
     risk = min(tried)[0]
     narrow = min(trial[3] for trial in tried if trial[0] <= ALIKE * risk)

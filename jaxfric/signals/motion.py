@@ -143,7 +143,8 @@ def kernel_half_width(recording: Recording) -> int:
     """
     if is_traced(recording):
         return 24
-    velocity = np.nan_to_num(np.asarray(recording.velocity, float))
+    velocity = np.asarray(recording.velocity, float)
+    velocity = np.where(np.isfinite(velocity), velocity, 0.0)
     limits, noise = host_scales(recording)
     linked = host_continuous(recording, float(limits.interval))
     position = recording.position
@@ -153,6 +154,8 @@ def kernel_half_width(recording: Recording) -> int:
     longest = int(np.count_nonzero(recording.mask)) // stretches // 8
     fitting = [k for k in HALF_WIDTHS if k <= max(2, longest)]
     broken = np.pad(np.cumsum(~linked), (1, 0))
+    if not limits.interval > 0:  # a clock that stands
+        return fitting[-1]
     for width in (k for k in fitting if k >= 16):
         shape = weights(width, 2) / limits.interval
         whole = broken[2 * width :] == broken[: -2 * width]

@@ -152,6 +152,8 @@ def local(
     offset = np.arange(-half_width, half_width + 1)
     wanted = index[:, None] + offset[None, :]
     at = np.clip(wanted, 0, len(log.time) - 1)
+    if not log.step > 0:  # a clock that stands
+        return at, np.zeros(at.shape)
     span = (half_width + 0.5) * log.step
     tau = (log.time[at] - log.time[index][:, None]) / span
     near = log.valid[at] & (log.segment[at] == log.segment[index][:, None]) & (at == wanted)
