@@ -181,3 +181,10 @@ def test_of_one_speed_the_mean_force_is_told(noise):
     if not noise:
         said = sentence(jf.constant_velocity(log, found), {"force": "N", "position": "m"})
         assert "the mean force is 12.01 ± 0.0" in said and "at 0.05 m/s." in said
+
+
+def test_a_report_has_the_contradiction():
+    recording = staircase(bumped)
+    plain = jf.identify("coulomb-viscous", recording)
+    assert jf.constant_velocity(recording, plain).contradicted
+    assert "the force contradicts the curve" in " ".join(plain.report(recording).split())

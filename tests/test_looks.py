@@ -276,6 +276,14 @@ def test_what_is_of_one_row_names_the_remedy(batch, name):
         getattr(batch, name)
 
 
+def test_the_report_is_what_needs_the_recording_too(fit, recording, batch):
+    said = fit.report(recording)
+    table = str(fit).split("\n\n")[1]
+    assert table in said and "Constant-velocity test" in said and "Break-away" in said
+    with pytest.raises(ValueError, match="no report"):
+        batch.report(recording)
+
+
 def test_a_batch_of_models_names_the_remedy(batch):
     with pytest.raises(ValueError, match=r"not a batch: give a row, fits\[i\].model"):
         batch.model.friction(0.1)

@@ -263,10 +263,25 @@ class Identified(eqx.Module):
         **Raises:** `ValueError` for a batch.
         """
         self._require_one("to_dict()")
+        return documents.finite(self._document(recording))
+
+    def report(self, recording: Recording) -> str:
+        """What the command says of an identification: `print(fit)` and what needs the recording.
+
+        That is the constant-velocity test, which may contradict the curve, and the break-away
+        levels.
+
+        **Arguments:** `recording` that it was identified from.
+
+        **Raises:** `ValueError` for a batch.
+        """
+        self._require_one("report()")
+        return tabulate.identification(self._document(recording), automatic=False)
+
+    def _document(self, recording: Recording | None) -> dict[str, Any]:
         test = None if recording is None else constant_velocity(recording, self)
         stick = None if recording is None else breakaway(recording, self)
-        document = documents.identification(text.on_host(self), recording, test=test, stick=stick)
-        return documents.finite(document)
+        return documents.identification(text.on_host(self), recording, test=test, stick=stick)
 
     def to_pandas(self):
         """The parameters with their 95 % intervals as a table of pandas.
