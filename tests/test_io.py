@@ -257,6 +257,12 @@ def test_a_commanded_force_is_named_where_none_is_measured():
     assert "--columns 'force=Torque Reference[%]'" in str(caught.value)
 
 
+def test_a_table_of_predicted_forces_is_no_recording():
+    names = ["time", "force", "measured_force", "in_motion"]
+    with pytest.raises(ValueError, match="log: jaxfric predict wrote this table"):
+        assign(names, None, "log")
+
+
 def test_columns_that_are_not_used_are_told(tmp_path):
     path = save(tmp_path / "log.csv", log() | {"s actual": log()["force"]})
     assert io.read_with_notes(path, served=True)[1][0].endswith("Not used: s actual.")

@@ -45,6 +45,8 @@ _WANTED = frozenset(
     "desired des reference ref setpoint sp set command commanded cmd target demand goal".split()
 )
 
+# What `jaxfric predict` writes beside the time.
+PREDICTED = ("force", "measured_force", "in_motion")
 # Of the columns that are not used so many are told.
 TOLD = 12
 
@@ -195,6 +197,11 @@ def assign(
             candidates.setdefault(role, []).append(name)
     for role, several in candidates.items():
         found = [name for name in several if not _ESTIMATED & set(_words(name))] or several
+        if role == "force" and set(PREDICTED) <= set(names):
+            raise ValueError(
+                f"{source}: jaxfric predict wrote this table of forces, in which no motion is. "
+                "Give the recording that it was made from."
+            )
         if len(found) > 1:
             raise ValueError(
                 f"{source}: {len(found)} columns could be the {role}: {listed(found)}. "
