@@ -60,6 +60,8 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
             told.parameters(sample.time)
             following = sample.time + arguments.every
     told.parameters(last)
+    if arguments.once:
+        told.end(source)
     return 0
 
 
@@ -134,6 +136,11 @@ class _Told:
             "parameters": values,
         }
         self._put(document, f"{time:10.3f} s  {forward}+{backward} strokes  {shown}")
+
+    def end(self, source: str) -> None:
+        """Where the intervals are, which need more than the sums that a stream leaves."""
+        if not self._json:
+            say(f"Intervals and checks of a whole log: jaxfric identify {source}")
 
     def change(self, change: Change) -> None:
         way = "forward" if change.direction > 0 else "backward"
