@@ -42,9 +42,8 @@ def dialect(lines: list[str], path: Path) -> Dialect:
             "a log. Is this text, with a line for each sample?"
         )
     above = _above(lines, rows)
-    rows, notes = rows[above:], ()
-    if above:
-        notes = (f"{above} line{'s' * (above > 1)} above the table left out.",)
+    rows = rows[above:]
+    notes = (f"{above} line{'s' * (above > 1)} above the table left out.",) if above else ()
     top = lines[rows[0]]
     delimiter = _delimiter(top)
     cells = split(top, delimiter)

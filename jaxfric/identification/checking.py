@@ -102,8 +102,8 @@ def checked(
     flat = (hidden & ~np.isnan(warnings[..., ONE_SPEED].ravel())).reshape(wrong.shape)
     model = found.model
     if np.isnan(alphas).any():
-        alpha = jnp.asarray(alphas.reshape(model.alpha.shape), model.alpha.dtype)
-        model = dataclasses.replace(model, alpha=alpha)
+        known = jnp.asarray(alphas.reshape(model.alpha.shape), model.alpha.dtype)
+        model = dataclasses.replace(model, alpha=known)
     return dataclasses.replace(
         found,
         model=model,
