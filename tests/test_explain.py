@@ -797,7 +797,9 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
         trial = contest.Trial(step, step.betas[0], 0.1, 0.01, 1, 0.002, 0.01, 1.0)
         below, above = np.searchsorted(grid, moment) + [-1, 0]
         found = [
-            contest._refined(seen, posed.base, trial._replace(beta=step.betas[i]), basis)
+            contest._refined(
+                seen, posed.base, posed.candidate_set, trial._replace(beta=step.betas[i]), basis
+            )
             for i in (below, above)
         ]
         every = np.linspace(grid[below], grid[above], 300)[:, None]
@@ -860,8 +862,8 @@ def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):
 def test_two_effects_that_hide_each_other_are_both_found(healthy, monkeypatch):
     """A step near the end of a record in which the machine warms: neither alone is significant."""
     warming = terms.ThermalDrift(terms.Coulomb())
-    run = planted(healthy[0], warming, (8.0,), (2.0,))
-    run = planted(run, terms.FrictionStep(terms.Coulomb()), (6.0,), (15.0,))
+    run = planted(healthy[0], warming, (7.0,), (2.0,))
+    run = planted(run, terms.FrictionStep(terms.Coulomb()), (5.0,), (15.0,))
     told = explain(run, "gaussian")
     assert {f.effect for f in told.findings} == {"thermal_drift", "friction_step"}
     monkeypatch.setattr(stepwise, "_hidden", lambda round_, *_: round_)
