@@ -212,7 +212,7 @@ def rows(seed=0, count=800, noise=0.05):
 
 def fit(columns, target, time):
     left = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
-    design = Design(columns, target, left, np.ones(len(time)), time)
+    design = Design(columns, target, left, np.ones(len(time)), time, np.zeros(3))
     error = np.linalg.norm(left) / np.linalg.norm(target)
     found = checks.fitted(design, error)
     return {kind.name: v for kind, v in zip(KINDS, found, strict=True) if not np.isnan(v)}
@@ -234,7 +234,7 @@ def test_noise_is_no_gain_where_each_direction_has_its_parameters():
         columns = np.concatenate([each[:, :2] for each in columns], axis=1)
         force = columns @ [5.0, 3.0, 5.0, 3.0] + left
         # A force of a thousandth less noise, as where rows of another kernel were fitted.
-        design = Design(columns, force, 0.999 * left, np.ones(len(time)), time)
+        design = Design(columns, force, 0.999 * left, np.ones(len(time)), time, np.zeros(4))
         assert np.isnan(checks.fitted(design, 0.05)).all()
 
 
@@ -342,7 +342,8 @@ def hidden(force):
     alpha = np.array([1.0, 3.0, 0.4])
     target = columns @ alpha + force(position, velocity)
     alpha, *_ = np.linalg.lstsq(columns, target, rcond=None)
-    design = Design(columns, target, target - columns @ alpha, np.ones(len(time)), time)
+    left, shift = target - columns @ alpha, np.zeros(3)
+    design = Design(columns, target, left, np.ones(len(time)), time, shift)
     return checks.hides(design, time, position, np.ones(len(time), bool), alpha, [0, 1, 2])
 
 

@@ -17,6 +17,8 @@ class Design(NamedTuple):
     - `columns`: derivatives of the rows by all parameters, affine ones first, `(J, P)`.
     - `target`: the force, N, and `left`, what the model leaves of it, `(J,)`.
     - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
+    - `shift`: by how much each parameter moves for a second by which the force is taken too late,
+      `(P,)`, of the fit itself, which closed windows make of other rows than these.
     """
 
     columns: Float[Array, "J P"]
@@ -24,3 +26,4 @@ class Design(NamedTuple):
     left: Float[Array, " J"]
     weight: Float[Array, " J"]
     time: Float[Array, " J"]
+    shift: Float[Array, " P"]

@@ -48,8 +48,8 @@ def suspects(
     for i, fit in enumerate(fits):
         late = fit.lateness
         if late is not None and not found[i]:
-            columns = designs.columns[i, used[i]]
-            stamped = bool(_stamped(late, fit, columns, target[i]))
+            columns, shift = designs.columns[i, used[i]], designs.shift[i]
+            stamped = bool(_stamped(late, fit, columns, target[i], shift))
             found[i] = stamped or late.gain > 0.99 * HALF * energies[i]
     return found
 
@@ -80,7 +80,8 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
         found |= _late(design, rows, basis, energy, power)
         found |= found or _split(columns, target, left, np.asarray(design.time)[rows], power)
     if known is not None and fit is not None and "force_late" not in found:
-        found |= _stamped(known, fit, np.asarray(design.columns, float)[rows], target)
+        columns, shift = np.asarray(design.columns, float)[rows], np.asarray(design.shift)
+        found |= _stamped(known, fit, columns, target, shift)
     if force_error > LEFT and np.sqrt(energy) > max(LEFT * np.sqrt(power), ROUGH * _rough(left)):
         found["structure_left"] = force_error
     elif force_error > LARGE:
@@ -156,13 +157,13 @@ def _slightly_late(known: Lateness | None, design: Design, energy, power) -> dic
     return {}
 
 
-def _stamped(known: Lateness, fit: Estimated, columns, target) -> dict[str, float]:
+def _stamped(known: Lateness, fit: Estimated, columns, target, shift) -> dict[str, float]:
     """By how much the force acts after its stamp, where a parameter that makes a good part of the
     force is off for it, by a twentieth and by more than its interval.
     """
     if not known.sure(fit.interval):
         return {}
-    moved = np.abs(known.time * known.shift[: len(fit.alpha)])
+    moved = np.abs(known.time * shift[: len(fit.alpha)])
     sizes = np.abs(fit.alpha) * np.linalg.norm(columns[:, : len(fit.alpha)], axis=0)
     large = sizes > PART * np.linalg.norm(target)
     off = large & (moved > OFF * fit.half) & (moved > MATTERS * np.abs(fit.alpha))

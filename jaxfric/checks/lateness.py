@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float
 
 from .design import HALF, Design
 
@@ -24,14 +23,12 @@ PIECE, TOGETHER = 256, 2**17
 class Lateness(NamedTuple):
     """By how much a recorded force is late, s (early below zero): u(t + τ) = u + τ du/dt.
 
-    `error`, s, of the time, by parts of the record; `shift`, by how much each second of it shifts
-    the parameters, `(P,)`; `gain`, the energy, N², that it would remove; `shape`, that of the
-    slope, N²/s².
+    `error`, s, of the time, by parts of the record; `gain`, the energy, N², that it would remove;
+    `shape`, that of the slope, N²/s².
     """
 
     time: float
     error: float
-    shift: Float[np.ndarray, " P"]
     gain: float
     shape: float
 
@@ -52,29 +49,26 @@ class Look(NamedTuple):
     gain: bool
 
 
-def lateness(design: Design, moving: Bool[np.ndarray, " P"] | None = None) -> Lateness | None:
+def lateness(design: Design) -> Lateness | None:
     """The [`Lateness`][] that the rows of a fit show; `None` where they cannot.
 
     Of less than a row. What the parameters imitate of it is no part of the estimate.
-
-    **Arguments:** `moving`: the parameters that shift with it, where others are known from what
-    these rows do not hold.
     """
-    return looks(jax.tree.map(lambda x: np.asarray(x)[None], design), moving)[0].late
+    return looks(jax.tree.map(lambda x: np.asarray(x)[None], design))[0].late
 
 
-def looks(designs: Design, moving: Bool[np.ndarray, " P"] | None = None) -> list[Look]:
+def looks(designs: Design) -> list[Look]:
     """The [`Look`][] of each fit of a batch, a leading axis `B` on all of the rows."""
     columns = np.asarray(designs.columns)
     most = max(1, TOGETHER // max(1, columns[0].size))
     found: list[Look] = []
     for start in range(0, len(columns), most):
         part = jax.tree.map(lambda x, at=start: np.asarray(x, float)[at : at + most], designs)
-        found += _looks(part, moving)
+        found += _looks(part)
     return found
 
 
-def _looks(designs: Design, moving) -> list[Look]:
+def _looks(designs: Design) -> list[Look]:
     found = [Look(None, True)] * len(designs.time)
     used = designs.weight > 0
     last = used.shape[1] - 1 - np.argmax(used[:, ::-1], axis=1)  # beyond is padding
@@ -93,13 +87,9 @@ def _looks(designs: Design, moving) -> list[Look]:
     size[size == 0] = 1.0
     values = np.stack([slope, positive], axis=2)
     table = _triangle(np.concatenate([columns / size[:, None, :], values], axis=2))
-    span, moved = table[:, :, :-2], slice(None) if moving is None else np.flatnonzero(moving)
-    shares, plain = _least(span, table[:, :, -2:])
+    shares, plain = _least(table[:, :, :-2], table[:, :, -2:])
     shares /= size[:, :, None]
     own, other = np.moveaxis(values - columns @ shares, 2, 0)
-    shift = np.zeros(size.shape)
-    few = shares if moving is None else _least(span[:, :, moved], table[:, :, -2:])[0]
-    shift[:, moved] = few[:, :, 0] / (1.0 if moving is None else size[:, moved])
     gain = ~plain | (
         _dots(other, left) ** 2 > 0.99 * HALF * _dots(left, left) * _dots(other, other)
     )
@@ -111,7 +101,7 @@ def _looks(designs: Design, moving) -> list[Look]:
             rest = (own[i] * (left[i] + time * own[i]))[used[i]]
             sums = np.add.reduceat(rest, np.arange(PARTS) * len(rest) // PARTS)
             error = float(np.sqrt(sums @ sums)) / powers[i]
-            late = Lateness(time, error, -shift[i], parts[i] ** 2 / powers[i], shapes[i])
+            late = Lateness(time, error, parts[i] ** 2 / powers[i], shapes[i])
         found[at] = Look(late, bool(gain[i]))
     return found
 

@@ -57,6 +57,8 @@ def solved(
     """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
     weight = rows.positive + rows.negative
     place = uncertainty.places(weight)
+    rise = signals.mean_slope(recording, recording.force, 1, limits.interval)
+    shift = _moved(jacobian, rise if rows.sampled else rows.rate(recording.force), weight)
     index = [i for i, p in enumerate(term.affine) if p.name == "inertia"]
     if not index or alpha.size == len(term.affine):
         left, columns = error, jacobian
@@ -64,7 +66,7 @@ def solved(
             columns = weak.columns(known, recording)
             left = weak.target - weak.offset(known, recording) - columns @ alpha
         spread = uncertainty.deviations(jacobian, error, weight, place)
-        design = _design(columns, left, weak)
+        design = _design(columns, left, weak, shift)
         return Solved(alpha, spread, design, jnp.zeros_like(alpha))
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
@@ -72,12 +74,22 @@ def solved(
     slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
     spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
+    push, friction = weighed.columns[:, :1], weighed.columns[:, 1:]
+    rise = weak.rate(recording.force) - friction @ shift
+    heavier = _moved(push, rise, weak.positive + weak.negative)
+    shift = jnp.insert(shift, index[0], heavier[0])
     return Solved(
         jnp.insert(alpha, index[0], weighed.mass),
         weighed.beside(spread, index[0]),
-        _design(_inserted(weighed.columns, index[0]), weighed.left, weak),
+        _design(_inserted(weighed.columns, index[0]), weighed.left, weak, shift),
         jnp.insert(pull, index[0], 0.0),
     )
+
+
+def _moved(columns, rise, weight):
+    """By how much parameters move for a second by which the force is late: u(t − τ) ≈ u − τ u̇."""
+    root = reduced.root(weight)
+    return reduced.least_squares(root[:, None] * columns, -root * rise)
 
 
 def _inserted(columns: Float[Array, "J p"], index: int) -> Float[Array, "J p"]:
@@ -86,8 +98,8 @@ def _inserted(columns: Float[Array, "J p"], index: int) -> Float[Array, "J p"]:
     return jnp.concatenate([others[:, :index], columns[:, :1], others[:, index:]], axis=1)
 
 
-def _design(columns, left, weak: Rows) -> Design:
-    return Design(columns, weak.target, left, weak.positive + weak.negative, weak.time)
+def _design(columns, left, weak: Rows, shift) -> Design:
+    return Design(columns, weak.target, left, weak.positive + weak.negative, weak.time, shift)
 
 
 def unseen(term, active, jacobian, weight) -> Bool[Array, " P"]:

@@ -1,6 +1,7 @@
 """What was identified, checked on the host before anyone sees it."""
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -12,7 +13,6 @@ import numpy as np
 from .. import checks, signals
 from ..checks import Design
 from ..data.recording import Recording, row_of
-from ..terms.base import changed_columns, summands
 from . import constant_load, uncertainty
 from .identified import Identified, Result, result_names
 
@@ -66,7 +66,7 @@ def checked(
     delayed = found.model.force_delay is not None
     passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
     intervals = signals.host_intervals(logs)
-    looks = checks.looks(designs, _moving(found, designs.columns.shape[-1]))
+    looks = checks.looks(designs)
     fits = [
         checks.Estimated(alpha, half, float(interval), look.late)
         for alpha, half, interval, look in zip(alphas, halves, intervals, looks, strict=True)
@@ -74,7 +74,8 @@ def checked(
     suspect = checks.suspects(designs, errors, looks, fits)
     for i, ((alpha, half, interval, late), error) in enumerate(zip(fits, errors, strict=True)):
         if late is not None:
-            matrices[i] += _by_lateness(late, interval, delayed, len(matrices[i]))
+            shift = designs.shift[i] * _unsure(late, interval, delayed)
+            matrices[i] += np.outer(shift, shift)
         if suspect[i]:
             fitted = checks.fitted(row_of(designs, i), float(error), fits[i])
             warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
@@ -113,35 +114,20 @@ def checked(
     )
 
 
-def _moving(found: Identified, count: int) -> np.ndarray | None:
-    """Which of `count` parameters a late force shifts, by rows of the weak form; `None`: all.
+def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
+    """The standard error, s, of the moment at which the force acts.
 
-    Closed windows know a bump by slow samples that no kernel in slip holds.
+    Whether it is held or its stamp is right is not known: all of a sure lateness is an error, and
+    of one that the rows do not tell from none as much as a hold makes. Where a delay was found,
+    that it was found is.
     """
-    if found.projection != "closed_windows":
-        return None
-    plain = [
-        not any(number in changed for changed in changed_columns(leaf))
-        for leaf in summands(found.model.term)
-        for number in range(len(leaf.affine))
-    ]
-    known = np.pad(plain, (0, max(0, count - len(plain))))[:count]
-    return None if known.all() else known
+    if late.sure(interval):
+        return abs(late.time)
+    return late.error if delayed else min(math.hypot(late.time, late.error), HELD * interval)
 
 
-def _by_lateness(late: checks.Lateness, interval: float, delayed: bool, count: int) -> np.ndarray:
-    """The covariance of the parameters, `(P, P)`, for not knowing when the force acts.
-
-    Whether it is held or its stamp is right is not known: all of a sure lateness is an error. Where
-    a delay was found, that it was found is.
-    """
-    found = np.zeros((count, count))
-    time = late.time if late.sure(interval) else late.error if delayed else 0.0
-    shift, known = time * late.shift, len(late.shift)  # closed windows: of the affine ones alone
-    found[:known, :known] = np.outer(shift, shift)
-    return found
-
-
+# A force that is held acts half a sample after its stamp.
+HELD = 0.5
 STRUCTURE, ONE_SPEED = (checks.NAMES.index(name) for name in ("structure_left", "one_speed"))
 
 
