@@ -346,11 +346,26 @@ def test_the_interval_of_a_bump_holds_what_a_held_force_makes_of_it():
         assert wide > 3 * narrow
 
 
-def test_a_force_at_its_stamp_stays_there():
+def stamped(late=0):
+    """The same motion with the force at its time stamp, or so many samples late."""
     run = held()
     model = jf.models.from_parameters(jf.models.coulomb_viscous(), HELD)
     noise = 0.2 * np.random.default_rng(0).normal(size=run.num_samples)
-    run = dataclasses.replace(run, force=jf.predict(model, run) + noise)
+    force = np.roll(np.asarray(jf.predict(model, run)), late) + noise
+    return jax.tree.map(lambda x: x[20:-20], dataclasses.replace(run, force=force))
+
+
+@pytest.mark.parametrize("align", [False, True])
+@pytest.mark.parametrize("late", [-3, 2, 4])
+def test_a_force_that_is_late_by_cycles_is_told(late, align):
+    """Beside friction and slow motion it is a small part of the force, and yet all that is left."""
+    (remark,) = jf.identify("coulomb-viscous", stamped(late), align=align).remarks
+    assert remark.name == "force_late"
+    assert float(remark.text.split()[1]) == pytest.approx(late / 250, rel=0.4)
+
+
+def test_a_force_at_its_stamp_stays_there():
+    run = stamped()
     found = jf.identify("coulomb-viscous", run, align=True)
     assert float(found.model.force_delay) == 0.0
     assert "The force acts at its time stamp, as far as the log shows." in repr(found)

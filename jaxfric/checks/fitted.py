@@ -23,13 +23,15 @@ LARGE = 0.25
 
 class Estimated(NamedTuple):
     """The first parameters of a design, `alpha`, their intervals' `half`, both `(p,)`, the
-    `interval` between the samples, s, and by how much the force is late, if that is known.
+    `interval` between the samples, s, by how much the force is late, if that is known, and whether
+    it was `aligned` already.
     """
 
     alpha: Float[np.ndarray, " p"]
     half: Float[np.ndarray, " p"]
     interval: float
     lateness: Lateness | None = None
+    aligned: bool = False
 
 
 def suspects(
@@ -50,7 +52,7 @@ def suspects(
         if late is not None and not found[i]:
             columns, shift = designs.columns[i, used[i]], designs.shift[i]
             stamped = bool(_stamped(late, fit, columns, target[i], shift))
-            found[i] = stamped or late.gain > 0.99 * HALF * energies[i]
+            found[i] = stamped or _beyond(late, fit, shift) or late.gain > 0.99 * HALF * energies[i]
     return found
 
 
@@ -74,11 +76,15 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
     # What turns the columns into each other takes little off the residual and much from the truth.
     basis = np.linalg.qr(columns)[0]
     known = lateness(design) if fit is None else fit.lateness
-    found = _slightly_late(known, design, energy, power)
+    least = MATTERS**2 * power, HALF * energy
+    if known is not None and fit is not None and _beyond(known, fit, np.asarray(design.shift)):
+        least = 0.0, HALF * (energy - _rough(left) ** 2)
+    found = _slightly_late(known, design, *least)
     found |= found or _gain(basis, target, left)
+    if not found and energy > least[0]:
+        found |= _late(design, rows, basis, energy, max(least))
     if not found and energy > MATTERS**2 * power:
-        found |= _late(design, rows, basis, energy, power)
-        found |= found or _split(columns, target, left, np.asarray(design.time)[rows], power)
+        found |= _split(columns, target, left, np.asarray(design.time)[rows], power)
     if known is not None and fit is not None and "force_late" not in found:
         columns, shift = np.asarray(design.columns, float)[rows], np.asarray(design.shift)
         found |= _stamped(known, fit, columns, target, shift)
@@ -145,14 +151,28 @@ def _least(columns: np.ndarray, target: np.ndarray) -> float:
     return float(rest @ rest)
 
 
-def _slightly_late(known: Lateness | None, design: Design, energy, power) -> dict[str, float]:
-    """A delay of less than a row. Half a sample of it is damping to a light, fast axis."""
+def _beyond(known: Lateness, fit: Estimated, shift) -> bool:
+    """Whether the force is surely later, or earlier, than a hold and a cycle of the controller make
+    it, and that counts: a parameter is off by a twentieth, or by its interval where that holds
+    zero; or the force was to be aligned.
+    """
+    if not known.told or known.sure(fit.interval):
+        return False
+    moved, size = np.abs(known.time * shift[: len(fit.alpha)]), np.abs(fit.alpha)
+    return fit.aligned or bool(np.any(moved > np.where(size > fit.half, MATTERS * size, fit.half)))
+
+
+def _slightly_late(known: Lateness | None, design: Design, changed, gain) -> dict[str, float]:
+    """A delay of less than a row. Half a sample of it is damping to a light, fast axis.
+
+    It changes the force by the energy `changed` at least, N², and takes off `gain`.
+    """
     if known is None:
         return {}
-    counts = known.time**2 * known.shape > MATTERS**2 * power
     rows = np.flatnonzero(np.asarray(design.weight) > 0)
     spacing = float(np.median(np.diff(np.asarray(design.time, float)[: rows[-1] + 1])))
-    if known.gain > HALF * energy and counts and abs(known.time) < spacing:
+    counts = known.time**2 * known.shape > changed and known.gain > gain
+    if counts and abs(known.time) < spacing:
         return {"force_late": known.time}
     return {}
 
@@ -170,8 +190,8 @@ def _stamped(known: Lateness, fit: Estimated, columns, target, shift) -> dict[st
     return {"force_stamped": -known.time} if off.any() else {}
 
 
-def _late(design: Design, rows, basis, energy, power) -> dict[str, float]:
-    """By how much the force is late, where taking it earlier leaves half of the residual.
+def _late(design: Design, rows, basis, energy, gain) -> dict[str, float]:
+    """By how much the force is late, where taking it earlier takes off an energy `gain`, N².
 
     To first order in the nonlinear parameters, whose columns are among the others.
     """
@@ -195,6 +215,10 @@ def _late(design: Design, rows, basis, energy, power) -> dict[str, float]:
     for lag in range(best - abs(best) // 3, best + abs(best) // 3 + 1):
         tried[lag] = left(lag)
     best = min(tried, key=tried.__getitem__, default=0)
-    if best and tried[best] < HALF * energy and energy - tried[best] > MATTERS**2 * power:
-        return {"force_late": best * spacing}
-    return {}
+    if not best or energy - tried[best] <= gain:
+        return {}
+    # Between whole rows by the parabola through three of them.
+    low, high = (energy if lag == 0 else left(lag) for lag in (best - 1, best + 1))
+    bend = low - 2 * tried[best] + high
+    part = 0.5 * (low - high) / bend if bend > 0 else 0.0
+    return {"force_late": (best + float(np.clip(part, -0.5, 0.5))) * spacing}

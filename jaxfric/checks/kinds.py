@@ -229,8 +229,9 @@ KINDS = (
     Kind(
         "force_late",
         False,
-        "Taken {value:.3g} s earlier, the force fits the motion with half the error: force and "
-        "motion were logged with different delays. Shift one of them; jaxfric explain tells more.",
+        "Taken {value:.3g} s earlier (later, if negative), the force leaves half as much beyond "
+        "the noise: force and motion were logged with different delays. Shift one of them; jaxfric "
+        "explain tells more.",
     ),
     Kind(
         "force_stamped",

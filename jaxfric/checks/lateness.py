@@ -32,12 +32,17 @@ class Lateness(NamedTuple):
     gain: float
     shape: float
 
+    @property
+    def told(self) -> bool:
+        """Whether it is told from none."""
+        return SURE * self.error < abs(self.time)
+
     def sure(self, interval: float) -> bool:
         """Whether it is told from none, and what a hold or a cycle of a controller makes.
 
         `interval` between the samples, s.
         """
-        return SURE * self.error < abs(self.time) <= STAMPED * interval
+        return self.told and abs(self.time) <= STAMPED * interval
 
 
 class Look(NamedTuple):

@@ -68,16 +68,17 @@ def checked(
     intervals = signals.host_intervals(logs)
     looks = checks.looks(designs)
     fits = [
-        checks.Estimated(alpha, half, float(interval), look.late)
+        checks.Estimated(alpha, half, float(interval), look.late, delayed)
         for alpha, half, interval, look in zip(alphas, halves, intervals, looks, strict=True)
     ]
     suspect = checks.suspects(designs, errors, looks, fits)
-    for i, ((alpha, half, interval, late), error) in enumerate(zip(fits, errors, strict=True)):
+    for i, (fit, error) in enumerate(zip(fits, errors, strict=True)):
+        alpha, half, interval, late, _ = fit
         if late is not None:
             shift = designs.shift[i] * _unsure(late, interval, delayed)
             matrices[i] += np.outer(shift, shift)
         if suspect[i]:
-            fitted = checks.fitted(row_of(designs, i), float(error), fits[i])
+            fitted = checks.fitted(row_of(designs, i), float(error), fit)
             warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
