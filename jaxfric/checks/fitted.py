@@ -95,8 +95,7 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
     return places(found)
 
 
-# By so many intervals a parameter has to be off: to first order, and of the weak form, since closed
-# windows may feel half of it.
+# By so many intervals a parameter has to be off, to first order.
 OFF = 2.0
 # Of a parameter that makes less than a fifth of the force a twentieth is no matter.
 PART = 0.2
