@@ -346,36 +346,6 @@ def test_the_interval_of_a_bump_holds_what_a_held_force_makes_of_it():
         assert wide > 3 * narrow
 
 
-def beside_a_spring(width, noise):
-    """Friction with a bump, N and m/s, beside a spring: only the weak form can tell."""
-    t, x, v, a = motion(10.0, 1000.0)
-    bump = 5.0 * np.sign(v) * np.exp(-((v / width) ** 2))
-    force = 3.0 * a + 12.0 * np.sign(v) + 30.0 * v + bump + 40.0 * x
-    force += noise * np.random.default_rng(0).normal(size=len(t))
-    model = jf.models.named("gaussian") + jf.terms.Spring()
-    return jf.identify(model, jf.Recording(t, force, x, v))
-
-
-def test_a_bump_below_the_speeds_of_the_rows_is_not_visible_beside_a_spring():
-    """Zero with a small interval would be a lie, and so would its extrapolated height."""
-    found = beside_a_spring(0.0005, 0.05)
-    for name in ("stribeck_force+", "stribeck_force-"):
-        low, high = found.parameters[name].interval()
-        assert low < 0 and 5.0 < high
-    said = " ".join(repr(found).split())
-    assert "would not be seen: the rows" in said or "hold little of a narrow bump" in said
-    assert "a simpler model" not in repr(found)
-    assert float(found.filtered_force_error) < 0.2
-
-
-def test_a_bump_that_the_rows_hold_is_identified_beside_a_spring():
-    found = beside_a_spring(0.06, 0.05)
-    assert found.result_name == "successful"
-    for name in ("stribeck_force+", "stribeck_force-"):
-        low, high = found.parameters[name].interval()
-        assert low < 5.0 < high and high - low < 1.0
-
-
 def stamped(late=0):
     """The same motion with the force at its time stamp, or so many samples late."""
     run = held()

@@ -18,8 +18,6 @@ from .projections import Rows
 # Samples each way for the mean acceleration: over more of them it lacks some of its peaks, over
 # fewer it is noisier.
 NEAR = 4
-# An interval that is ten times as wide for another width of the bump says nothing of its height.
-FAR = 10.0
 
 
 def solve(term, beta, recording, rows: Rows, alpha=None):
@@ -117,36 +115,6 @@ def unseen(term, active, jacobian, weight) -> Bool[Array, " P"]:
         beside = [act for name, act in own.items() if name.endswith(sign)] if sign in "+-" else []
         idle.append(~jnp.any(jnp.stack(beside)) if beside else jnp.zeros((), bool))
     return jnp.stack(idle)
-
-
-def narrower_bumps(term, beta, alpha, matrix, jacobian, low, recording, rows: Rows):
-    """The covariance where a Stribeck bump that is not told from zero may be as narrow as its
-    bounds `low`, `(d,)` as β, allow: then the rows hold less of it, and its height is less known,
-    or, [`FAR`][] less, not at all.
-
-    `jacobian` of the rows, by all parameters of the term, `(J, P)`.
-    """
-    names = [p.name for p in (*term.affine, *term.nonlinear)]
-    heights = [i for i, n in enumerate(names[: alpha.size]) if n.startswith("stribeck_force")]
-    if not heights:
-        return matrix
-    others = [i for i, n in enumerate(names) if not n.startswith("stribeck_")]
-    narrow = jnp.stack([
-        low[k] if p.name.startswith("stribeck_velocity") else beta[k]
-        for k, p in enumerate(term.nonlinear)
-    ])  # fmt: skip
-    there = rows.columns(term.with_beta(narrow), recording)[:, jnp.array(heights)]
-    both = jnp.concatenate([jacobian[:, jnp.array(heights)], there], axis=1)
-    root = reduced.root(rows.positive + rows.negative)[:, None]
-    basis = reduced.orthonormal(root * jacobian[:, jnp.array(others)])
-    found, least = jnp.sum(reduced.project_out(basis, root * both) ** 2, axis=0).reshape(2, -1)
-    variance = jnp.diagonal(matrix)[jnp.array(heights)]
-    bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
-    faint = jnp.abs(alpha[jnp.array(heights)]) <= bound * jnp.sqrt(variance)
-    seen = least * FAR**2 > found
-    ratio = jnp.where(seen, found / jnp.where(seen, least, 1.0), jnp.inf)
-    more = jnp.where(faint & (ratio > 1), variance * (ratio - 1), 0.0)
-    return matrix.at[jnp.array(heights), jnp.array(heights)].add(more)
 
 
 class Oddities(NamedTuple):

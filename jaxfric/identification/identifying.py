@@ -29,10 +29,6 @@ from .setup import Setup, ready_rows, set_up, together
 # information on the floor; then the weak form, which needs no closing, is the better choice.
 LEAST_COVERED = 0.5
 
-# Of a bump narrower than this share of the slowest speed that rows hold, they hold less than a
-# fiftieth (e⁻⁴ of a Gaussian one): its height would be extrapolated fiftyfold.
-NARROWEST = 0.5
-
 # Samples at once that keep an accelerator busy: some hundred numbers for each are 3 GB.
 SAMPLES = 2**22
 
@@ -155,15 +151,12 @@ solve_rows = programs.compiled(_solve_rows)
 
 
 class _Searched(NamedTuple):
-    """What the nonlinear parameters were searched in, with their lower bounds `low`, and what was
-    found; the velocity's noise.
-    """
+    """What the nonlinear parameters were searched in, and what was found; the velocity's noise."""
 
     limits: Scales
     noise: Float[Array, ""]
     rows: Rows
     found: Found
-    low: Float[Array, " d"]
 
 
 @programs.compiled
@@ -173,12 +166,12 @@ def _search_rows(magnitudes, term, recording, projection, width, given, grid) ->
     limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
     rows = projection.rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
-    reached = limits._replace(fastest=_reached(rows, recording, limits))
-    box = _box(active, rows, recording, reached, dict(given))
+    box = term_bounds(
+        active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
+    )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    found = search(active, recording, rows, box, grid, alike)
-    return _Searched(limits, noise, rows, found, box[0])
+    return _Searched(limits, noise, rows, search(active, recording, rows, box, grid, alike))
 
 
 @programs.compiled
@@ -186,7 +179,7 @@ def _assess(
     searched: _Searched, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
     """All parameters and what is known about them, from the nonlinear ones."""
-    limits, noise, rows, best, low = searched
+    limits, noise, rows, best = searched
     beta, converged, border, alpha = best[:4]
     finite = _finite(recording)
     recording = _sanitised(recording)
@@ -201,11 +194,7 @@ def _assess(
     matrix = spread.covariance
     nothing = ~finite | (jnp.sum(weight) <= 0)
     alpha = jnp.where(nothing, jnp.nan, alpha)
-    matrix = own = jnp.where(nothing, jnp.inf, matrix)
-    if not rows.sampled:
-        matrix = assessment.narrower_bumps(
-            active, beta, alpha, matrix, jacobian, low, recording, rows
-        )
+    matrix = jnp.where(nothing, jnp.inf, matrix)
     unseen = assessment.unseen(term, active, jacobian, weight) & jnp.isinf(jnp.diagonal(matrix))
     # What acts in no row is anywhere in its bounds.
     border = border & ~unseen[alpha.size :]
@@ -220,7 +209,7 @@ def _assess(
     error = weak.relative(design.left)
     odd = assessment.Oddities(
         described=~(error**2 > 1 - LEAST_EXPLAINED),
-        passive=assessment.passive(term, alpha, own, design, weak, recording),
+        passive=assessment.passive(term, alpha, matrix, design, weak, recording),
     )
     found = Identified(
         model,
@@ -274,27 +263,6 @@ def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, "
     top = jnp.max(jnp.where(used, jnp.abs(velocity)[None, :], 0.0), axis=1)
     both = jnp.min(jnp.where(top > limits.slowest, top, jnp.inf))
     return jnp.maximum(jnp.minimum(limits.fastest, both), 4 * limits.slowest)
-
-
-def _box(term, rows: Rows, recording: Recording, limits: Scales, given) -> Float[Array, "2 d"]:
-    """The bounds of the nonlinear parameters, each direction's by what its rows hold.
-
-    Rows of the weak form, which lie wholly inside slip, begin at a higher speed than slip does.
-    """
-    if rows.sampled:
-        return term_bounds(term, limits, given)
-    speed = jnp.abs(rows.project(recording.velocity[:, None])[:, 0])
-    begin = [jnp.min(speed, where=w > 0, initial=jnp.inf) for w in (rows.positive, rows.negative)]
-    begin = [*begin, jnp.minimum(*begin)]
-    boxes = []
-    for speed in begin:
-        held = jnp.where(jnp.isfinite(speed), NARROWEST * speed, 0.0)
-        slowest = jnp.clip(held, limits.slowest, 0.25 * limits.fastest)
-        boxes.append(term_bounds(term, limits._replace(slowest=slowest), given))
-    own = {"+": 0, "-": 1}
-    places = [own.get(parameter.name[-1], 2) for parameter in term.nonlinear]
-    columns = [boxes[place][:, i] for i, place in enumerate(places)]
-    return jnp.stack(columns, axis=1) if columns else boxes[0]
 
 
 def _finite(recording: Recording) -> Bool[Array, ""]:

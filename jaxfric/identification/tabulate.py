@@ -70,8 +70,7 @@ def identified(
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
     if document["result"] != "not_passive":
-        weak = document["projection"] == "weak_form"
-        told += _remarks(document["parameters"], document["warnings"], weak)
+        told += _remarks(document["parameters"], document["warnings"])
     chosen = standings(document["selection"]) if "selection" in document else []
     return [
         _source(document),
@@ -207,13 +206,8 @@ def _closing(document: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _remarks(
-    parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]], weak: bool
-) -> list[str]:
-    """What an engineer would object to, said first; what the warnings say is not said again.
-
-    `weak`: whether the rows are those of the weak form.
-    """
+def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What an engineer would object to, said first; what the warnings say is not said again."""
     seen = {name: entry for name, entry in parameters.items() if entry["interval"]}
     sizes = {name: (entry["value"], _half(entry)) for name, entry in seen.items()}
     falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
@@ -230,14 +224,8 @@ def _remarks(
         )
     if faint:
         lines.append(
-            f"{' and '.join(faint)} cannot be told from zero, nor then its velocity: "
-            + (f"{_NARROW}." if weak else _SIMPLER)
-        )
-    unseen = [n for n in parameters if _bump(n) and n not in seen]
-    if lost := [n for n in unseen if weak and n.replace("stribeck_force", "coulomb") in seen]:
-        lines.append(
-            f"{' and '.join(lost)} would not be seen: {_NARROW}, as a model without it says "
-            "nothing of friction there."
+            f"{' and '.join(faint)} cannot be told from zero, nor then its velocity: a simpler "
+            "model may do (--model best, in Python jaxfric.select, lets held-out data choose)."
         )
     if wrong:
         lines.append(
@@ -245,14 +233,6 @@ def _remarks(
             "is wrong, or a force that the model lacks (load, cogging) is taken for it."
         )
     return lines
-
-
-_SIMPLER = (
-    "a simpler model may do (--model best, in Python jaxfric.select, lets held-out data choose)."
-)
-_NARROW = (
-    "the rows lie wholly inside slip and hold little of a narrow bump. Move slower or log faster"
-)
 
 
 def _bump(name: str) -> bool:
