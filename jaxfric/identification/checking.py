@@ -1,7 +1,6 @@
 """What was identified, checked on the host before anyone sees it."""
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 
@@ -118,17 +117,12 @@ def checked(
 def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
     """The standard error, s, of the moment at which the force acts.
 
-    Whether it is held or its stamp is right is not known: all of a sure lateness is an error, and
-    of one that the rows do not tell from none as much as a hold makes. Where a delay was found,
-    that it was found is.
+    Whether it is held or its stamp is right is not known: all of a sure lateness is an error. Where
+    a delay was found, that it was found is.
     """
-    if late.sure(interval):
-        return abs(late.time)
-    return late.error if delayed else min(math.hypot(late.time, late.error), HELD * interval)
+    return abs(late.time) if late.sure(interval) else late.error if delayed else 0.0
 
 
-# A force that is held acts half a sample after its stamp.
-HELD = 0.5
 STRUCTURE, ONE_SPEED = (checks.NAMES.index(name) for name in ("structure_left", "one_speed"))
 
 

@@ -9,9 +9,9 @@ from ..checks import Remark
 from ..models import NAMED, name_of
 from .uncertainty import COSINES, student_quantile
 
-# The dry friction of guides, seals and gears differs by some per cent with the direction. From a
-# fifth of it on, one direction half as much again as the other, a load is as likely.
-SHARE = 0.2
+# The dry friction of guides, seals and gears differs with the direction, by half at most. From a
+# third of it on, one direction twice as much as the other, a load is as likely.
+SHARE = 1 / 3
 NAME = "constant_load"
 
 
