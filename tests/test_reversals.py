@@ -235,5 +235,5 @@ def test_short_segments_keep_their_rows():
     parts = {"run": np.repeat(np.arange(10), 10), "position": np.tile(np.arange(10.0), 10)}
     rows = np.arange(80)
     np.testing.assert_array_equal(evidence._known_from(parts, rows, rows, 5.0), rows)
-    parts = {"run": np.zeros(100, int), "position": np.arange(100.0)}
+    parts, rows = {"run": np.zeros(1000, int), "position": np.arange(1000.0)}, np.arange(800)
     np.testing.assert_array_equal(evidence._known_from(parts, rows, rows, 5.0), rows[6:])
