@@ -110,7 +110,7 @@ class CandidateSet:
         return candidate.effect.scatter(candidate.term, view(evidence), count)
 
     def keep(self, candidate: Candidate, betas: np.ndarray) -> None:
-        """Of these [`scattered`][] β alone is thought again."""
+        """Look at these of the [`scattered`][] β alone from now on, `(G, d)`."""
         self._scattered[type(candidate.term)] = betas
 
     def close(self) -> None:

@@ -193,8 +193,8 @@ class ElasticBacklash(AbstractStates):
 
 
 def _speed_bounds(scales):
-    """Of guides and gears the viscous friction at full speed is three times the dry one at most;
-    to one that has nearly none of it.
+    """From a viscous friction of three times the dry one at full speed, the most that guides and
+    gears have, to nearly none.
     """
     return scales.fastest / 3, 30 * scales.fastest
 
