@@ -65,16 +65,19 @@ class CandidateSet:
     predicts belong to a round.
     """
 
-    def __init__(self, evidence: Evidence, base: AbstractTerm):
-        self.candidates = candidates(evidence, base)
+    def __init__(
+        self, evidence: Evidence, base: AbstractTerm, before: "CandidateSet | None" = None
+    ):
+        self.groups = _sharing(candidates(evidence, base))
         self._motion, self._rows, self._reach = evidence.motion, evidence.rows, evidence.reach
         # With all the signals that there will be, since programs are compiled for these.
         none = np.zeros(evidence.motion.num_samples)
         seen = evidence.with_channels(**dict.fromkeys(PREDICTED, none))
-        own = [each for each in self.candidates if not each.term.coordinates & PREDICTED]
-        self._scattered: dict[type, np.ndarray] = {}
-        self._widest = _widest(own)
-        own = _within([c for c in own if id(c) not in self._widest], len(evidence.target))
+        own = [_widest(some) for some in self.groups]
+        own = [each for each in own if not each.term.coordinates & PREDICTED]
+        # What a search has kept of a law's β, `(G, d)` each, by a key of its own.
+        self.kept_betas: dict[Hashable, np.ndarray] = {} if before is None else before.kept_betas
+        own = _within(own, len(evidence.target))
         started = begin(functools.partial(_columns, seen), own)
         self._kept = dict(zip(map(id, own), started, strict=True))
 
@@ -88,30 +91,22 @@ class CandidateSet:
         pairs = ((ours[name], theirs[name]) for name in ours if known)
         return known and all(np.array_equal(*p) for p in [(self._rows, evidence.rows), *pairs])
 
-    def columns(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
-        """The columns of one candidate on its whole grid, `(G, k, J)`, scaled to about one."""
-        known = self._kept.get(self._widest.get(id(candidate), id(candidate)))
-        if known is None:
-            return _columns(evidence, candidate)
-        lines = candidate.lines
-        return known.result() if lines is None else known.result()[:, : 2 * lines.harmonics]
+    def columns(self, group: list[Candidate], evidence: Evidence) -> Iterator[np.ndarray]:
+        """The columns of each of a group on its grid, `(G, k, J)`, scaled to about one."""
+        wide = _widest(group)
+        known = self._kept.get(id(wide))
+        columns = _columns(evidence, wide) if known is None else known.result()
+        for each in group:
+            yield columns if each.lines is None else columns[:, : 2 * each.lines.harmonics]
 
     def scattered(self, candidate: Candidate, evidence: Evidence) -> np.ndarray:
-        """Further β, `(G, d)`, of a candidate whose energy has minima between those of its grid.
-
-        The first time many of them over all of the set, then those that were kept.
+        """β, `(G, d)`, scattered over the whole set of a candidate whose energy has minima between
+        those of its grid; none of others.
         """
         if candidate.effect.scatter is None:
             return np.zeros((0, candidate.betas.shape[1]))
-        known = self._scattered.get(type(candidate.term))
-        if known is not None:
-            return known
         count = min(SCATTERED, int(STEPS // evidence.nodes))
         return candidate.effect.scatter(candidate.term, view(evidence), count)
-
-    def keep(self, candidate: Candidate, betas: np.ndarray) -> None:
-        """Look at these of the [`scattered`][] β alone from now on, `(G, d)`."""
-        self._scattered[type(candidate.term)] = betas
 
     def close(self) -> None:
         """Begin no more columns."""
@@ -124,16 +119,17 @@ class CandidateSet:
         self._kept = {}
 
 
-def _widest(candidates: list[Candidate]) -> dict[int, int]:
-    """Waves whose columns begin those of others, which have more harmonics: whose, by `id`."""
-    found: dict[int, int] = {}
-    most: dict[Any, Candidate] = {}
-    waves = [(c.lines, c) for c in candidates if c.lines is not None]
-    for lines, each in sorted(waves, key=lambda pair: -pair[0].harmonics):
-        wide = most.setdefault((lines[:3], each.betas.tobytes()), each)
-        if wide is not each:
-            found[id(each)] = id(wide)
-    return found
+def _sharing(candidates: list[Candidate]) -> list[list[Candidate]]:
+    """The candidates by groups: waves whose columns begin those of others, with more harmonics."""
+    found: dict[Any, list[Candidate]] = {}
+    for each in candidates:
+        key = id(each) if each.lines is None else (each.lines[:3], each.betas.tobytes())
+        found.setdefault(key, []).append(each)
+    return list(found.values())
+
+
+def _widest(group: list[Candidate]) -> Candidate:
+    return max(group, key=lambda each: 0 if each.lines is None else each.lines.harmonics)
 
 
 def _within(candidates: list[Candidate], rows: int) -> list[Candidate]:

@@ -1,7 +1,8 @@
 """One round of the contest: every candidate on the grid, the best refined with the whole model."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Collection
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -109,27 +110,38 @@ def contest(
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     bootstrap = BlockBootstrap(current, block, seed)
 
-    def scanned(candidate: Candidate) -> Scan:
-        return bootstrap(field.columns(candidate, seen), candidate.effect.positive)
+    def scanned(group: list[Candidate]) -> list[Scan]:
+        pairs = zip(group, field.columns(group, seen), strict=True)
+        return [bootstrap(columns, candidate.effect.positive) for candidate, columns in pairs]
 
-    scans = each(scanned, field.candidates)
-    p_values = _p_values(scans)
-    known = [s.gain[s.best] for s, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
-
-    def again(numbered: tuple[Candidate, Scan, float]) -> Scan:
-        candidate, scan, p_value = numbered
-        if p_value <= LEVEL or scan.gain[scan.best] <= max(known):
-            return scan
-        columns = field.columns(candidate, seen)
-        return bootstrap.beside_structure(scan, columns, candidate.effect.positive)
-
+    candidates = list(chain.from_iterable(field.groups))
+    scans = dict(zip(map(id, candidates), chain(*each(scanned, field.groups)), strict=True))
+    p_values = _p_values(scans.values())
+    best = {key: scan.gain[scan.best] for key, scan in scans.items()}
+    known = [best[key] for key, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
     if known:  # the residual is no noise
-        scans = each(again, zip(field.candidates, scans, p_values, strict=True))
-        p_values = _p_values(scans)
-    least = thresholds(np.array([s.drawn for s in scans]), LEVEL)
+        doubtful = {
+            key
+            for key, p_value in zip(scans, p_values, strict=True)
+            if p_value > LEVEL and best[key] > max(known)
+        }
+
+        def again(group: list[Candidate]) -> dict[int, Scan]:
+            pairs = zip(group, field.columns(group, seen), strict=True)
+            return {
+                id(one): bootstrap.beside_structure(scans[id(one)], columns, one.effect.positive)
+                for one, columns in pairs
+                if id(one) in doubtful
+            }
+
+        groups = [some for some in field.groups if not doubtful.isdisjoint(map(id, some))]
+        for changed in each(again, groups):
+            scans |= changed
+        p_values = _p_values(scans.values())
+    least = thresholds(np.array([s.drawn for s in scans.values()]), LEVEL)
     trials = [
-        _trial(candidate, scan, float(p), float(limit))
-        for candidate, scan, p, limit in zip(field.candidates, scans, p_values, least, strict=True)
+        _trial(candidate, scans[id(candidate)], float(p), float(limit))
+        for candidate, p, limit in zip(candidates, p_values, least, strict=True)
     ]
     fast = fast_tone(seen, current)
     loud = [c for effect, term in tones(seen) for c in at_frequencies(effect, term, fast)]
@@ -150,7 +162,7 @@ def contest(
     return Contest(trials, finalists, size)
 
 
-def _p_values(scans: list[Scan]) -> np.ndarray:
+def _p_values(scans: Collection[Scan]) -> np.ndarray:
     """p-values of the best group of each scan, corrected for all of them, `(C,)`."""
     return adjusted(np.array([s.gain[s.best] for s in scans]), np.array([s.drawn for s in scans]))
 
@@ -229,7 +241,9 @@ def _finals(
         p_value = min(trial.p_value, p_value)
         return found._replace(score=trial.score(gain, size), p_value=p_value)
 
-    done = [found for found in each(final, enumerate(trials)) if found is not None]
+    # What takes longest comes first, so that no thread waits for another at the end.
+    ordered = sorted(enumerate(trials), key=lambda pair: not pair[1].candidate.term.stepped)
+    done = [found for found in each(final, ordered) if found is not None]
     return sorted(done, key=lambda finalist: -finalist.score)
 
 

@@ -2,16 +2,18 @@
 
 A load that flies through a gap strikes a flank sooner or later by a little of any parameter. So β
 is scattered over all of its set, then about the best of these and of the grid over a step of the
-grid, then over half of that, and so on.
+grid, then over half of that, and so on. Where the same law was tried beside the same terms already,
+for a force taken a little later, what was found then is where this begins.
 """
 
+import jax
 import numpy as np
 
 from ..terms.effect import scattered
 from .burdens import largest
 from .candidates import Candidate, CandidateSet
 from .evidence import Evidence
-from .regression import Fit, fit, gains
+from .regression import Fit, fast, fit, gains
 
 # So many about each of the best, so often.
 AROUND, BEST, ROUNDS = 64, 3, 4
@@ -52,22 +54,35 @@ def among_many(
         most = largest(term, np.stack(found.betas), current)
         return bool(np.all(found.alphas[0] <= most))
 
-    best, wide = starts, field.scattered(candidate, seen)
-    if len(wide):
-        wide = wide[np.argsort(-gained(wide), kind="stable")[:WORTH]]
-        field.keep(candidate, wide)
-        best = np.concatenate([starts, wide[: 2 * BEST]])
+    def refined(some: np.ndarray) -> list[Fit]:
+        return [fit([term], seen, [beta], 8, basis) for beta in np.unique(some, axis=0)]
+
+    near = refined(starts)
+    near = [each for each in near if within(each)] or near
+    best_near = min(near, key=lambda each: each.energy)
+    if len(current.residual) * fast(current) ** 2 > (1 - BEYOND_CHANCE) * current.energy:
+        return best_near  # of noise nothing can be removed
+    kept, form = field.kept_betas, candidate.form
+    here = form, *map(jax.tree.structure, current.terms)
+    best, rounds = kept.get(here), range(ROUNDS - 1, ROUNDS)
+    if best is None:
+        best, rounds = starts, range(ROUNDS)
+        wide = kept[form] if form in kept else field.scattered(candidate, seen)
+        if len(wide):
+            wide = wide[np.argsort(-gained(wide), kind="stable")[:WORTH]]
+            kept[form] = wide
+            best = np.concatenate([starts, wide[: 2 * BEST]])
     values = [np.log(np.unique(each)) for each in candidate.betas.T]
     step = np.array([np.max(np.diff(each), initial=0.0) for each in values])
     scatter = 2 * scattered(AROUND, len(step)) - 1
-    for number in range(ROUNDS):
+    for number in rounds:
         spread = np.exp(scatter * step / 2**number)
         tried = np.concatenate([best, *(each * spread for each in best)])
         best = tried[np.argsort(-gained(tried), kind="stable")[:BEST]]
-    near, far = ([fit([term], seen, [beta], 8, basis) for beta in some] for some in (starts, best))
-    far = [each for each in far if within(each)] or [fit([term], seen, [best[0]], 0, basis)]
+    kept[here] = best
+    far = [each for each in refined(best) if within(each)]
+    far = far or [fit([term], seen, [best[0]], 0, basis)]
     found = min(far, key=lambda each: each.energy)
-    near = [each for each in near if within(each)] or near
     if found.energy > (1 - BEYOND_CHANCE) * current.energy:
-        return min(near, key=lambda each: each.energy)
-    return min((found, *near), key=lambda each: (not within(each), each.energy))
+        return best_near
+    return min((found, best_near), key=lambda each: (not within(each), each.energy))

@@ -172,7 +172,7 @@ def _assembled(
     base = fit([structure], evidence, known.betas[:1])
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     ours = next((some for some in candidate_sets if some.serves(evidence)), None)
-    ours = ours or CandidateSet(evidence, structure)
+    ours = ours or CandidateSet(evidence, structure, candidate_sets[0])
     every = (ours, *(some for some in candidate_sets if some is not ours))
     between = _wider(motion, evidence, delay, across, BETWEEN)
     return Problem(evidence, wide, between, base, block, structure, every, delay)

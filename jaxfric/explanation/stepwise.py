@@ -90,13 +90,18 @@ def select(
             simplest(own.best, own.contest), own.contest, own.current, own.evidence, own.spoiling
         )
         betas = (*best.betas[: len(current.betas)], best.betas[-1])
-        current, evidence = joined(best._replace(betas=betas), current, evidence)
+        with_it, seen = joined(best._replace(betas=betas), current, evidence)
+        if with_it.energy >= current.energy:
+            nothing.add(best.trial.candidate.form)
+            continue
+        current, evidence = with_it, seen
         trial = with_own_term(best.trial, current)
         selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
-        current, selected = _pruned(evidence, current, selected, round_.contest.size)
+        current, evidence, selected = _pruned(evidence, current, selected, round_.contest.size)
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)
-            current = without(current, evidence, len(current.terms) - len(selected) + number)
+            less = without(current, evidence, len(current.terms) - len(selected) + number)
+            current, evidence = _predicting(less, evidence)
             selected = [each for i, each in enumerate(selected) if i != number]
         if first and selected:
             break
@@ -150,11 +155,19 @@ def _started(problem: Problem, in_slip: Selection | None) -> tuple[Fit, list[Sel
 
 
 def joined(best: Finalist, current: Fit, evidence: Evidence) -> tuple[Fit, Evidence]:
-    """The model with a term of its own for the winner: two waves of one candidate are two terms."""
+    """The model with a term of its own for the winner: two waves of one candidate are two terms.
+
+    It may leave more than without: some laws act on the force that the others predict, and beside
+    what they predicted before, a part of it does for the whole.
+    """
     terms = (*current.terms, copy.copy(best.trial.candidate.term))
-    current = fit(terms, evidence, best.betas)
+    return _predicting(fit(terms, evidence, best.betas), evidence)
+
+
+def _predicting(current: Fit, evidence: Evidence) -> tuple[Fit, Evidence]:
+    """The fit refined beside what it predicts itself, and the rows that say so."""
     evidence = with_predictions(evidence, current)
-    return fit(terms, evidence, current.betas, 4), evidence
+    return fit(current.terms, evidence, current.betas, 4), evidence
 
 
 def with_own_term(trial: Trial, current: Fit) -> Trial:
@@ -172,7 +185,7 @@ def elsewhere(selection: Selection) -> tuple[Fit, list[SelectedTerm]]:
 
 def _pruned(
     evidence: Evidence, current: Fit, selected: list[SelectedTerm], size: float
-) -> tuple[Fit, list[SelectedTerm]]:
+) -> tuple[Fit, Evidence, list[SelectedTerm]]:
     """Without terms that the newest one, or the base refitted beside it, has made idle.
 
     A term is idle, too, if it does not help to predict blocks that it was not fitted to; of a force
@@ -187,6 +200,6 @@ def _pruned(
         if not trial.effect.momentary:
             idle |= left_out(current, index, block) >= less.energy
         if idle:
-            current = less
+            current, evidence = _predicting(less, evidence)
             selected = [each for i, each in enumerate(selected) if i != index - start]
-    return current, selected
+    return current, evidence, selected
