@@ -8,15 +8,12 @@ from ..terms.effect import Effect
 from .contest import Contest, Finalist, Trial
 from .evidence import Evidence
 from .predictions import with_predictions
-from .problem import BETWEEN, WideKernels
+from .problem import BETWEEN, LEAST_SHARE, WideKernels
 from .regression import Fit, fast, fit
 from .selection import SelectedTerm
 from .significance import DRAWS, LEVEL
 
-# Least part of the mean-square residual that a first and a later term must remove. Below it the
-# amplitude is under a sixth of the residual's, where held forces, encoder counts and smoothed
-# velocities leave traces of their own.
-LEAST_SHARE = 0.03
+# The same of a later term as `LEAST_SHARE` is of the first.
 LATER_SHARE = 0.05
 # A later term must also remove this part of the base's residual, or a third of what the earlier
 # terms leave: no term has quite the shape of its effect, and a tenth of its amplitude may remain.

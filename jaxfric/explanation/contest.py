@@ -10,7 +10,7 @@ import numpy as np
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
-from .many_minima import among_many
+from .many_minima import BEYOND_CHANCE, among_many, noise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains
 from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
@@ -234,9 +234,12 @@ def _finals(
         if found is not None and _overshadowed(trial, found.alpha):
             trial = _overtone(trial, found)
             found = _refined(seen, current, field, trial, basis)
-        if found is None or not _sensible(trial, found.alpha):
+        return assessed(found)
+
+    def assessed(found: Finalist | None) -> Finalist | None:
+        if found is None or not _sensible(found.trial, found.alpha):
             return None
-        gain = 1 - found.energy / current.energy
+        trial, gain = found.trial, 1 - found.energy / current.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
         return found._replace(score=trial.score(gain, size), p_value=p_value)
@@ -244,6 +247,13 @@ def _finals(
     # What takes longest comes first, so that no thread waits for another at the end.
     ordered = sorted(enumerate(trials), key=lambda pair: not pair[1].candidate.term.stepped)
     done = [found for found in each(final, ordered) if found is not None]
+    # The grid may show none of the minima of a law of many.
+    least = (1 - BEYOND_CHANCE) * min((found.energy for found in done), default=current.energy)
+    if least > noise(current):
+        tried = {id(found.trial) for found in done}
+        left = [t for t in trials if t.effect.scatter and t.candidate.term.stepped]
+        late = [_refined(seen, current, field, t, basis) for t in left if id(t) not in tried]
+        done += filter(None, [assessed(found) for found in late if found.energy < least])
     return sorted(done, key=lambda finalist: -finalist.score)
 
 

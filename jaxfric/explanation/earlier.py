@@ -10,13 +10,13 @@ import numpy as np
 
 from ..data.recording import Recording
 from . import parameters as spelled, verification
-from .acceptance import LEAST_SHARE
 from .baseline import Baseline
 from .evidence import Evidence
 from .findings import Solution
 from .locate import locate
 from .mismatch import SURE, Mismatch
 from .predictions import PREDICTED, with_predictions
+from .problem import LEAST_SHARE
 from .regression import Fit, fit
 from .structure import significant
 from .verdict import rough

@@ -21,7 +21,7 @@ from ..terms.base import AbstractTerm
 BATCH, PAIR = 8, 2
 # Of a load that is stepped along the motion: of a grid, or one with all neighbours that give its
 # derivatives, as eight steps side by side take hardly longer than two.
-STEPPED, NEIGHBOURS = 32, 8
+STEPPED, NEIGHBOURS = 64, 8
 
 
 def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
@@ -61,7 +61,7 @@ def _columns(form, betas, numbers, motion):
     def one(beta):
         inside = iter(numbers)
         known = _renumbered(form.with_beta(beta), lambda _: next(inside))
-        return known.columns(motion).T, known.momentum(motion).T if form.inertial else None
+        return jax.tree.map(jnp.transpose, known.columns_and_momentum(motion))
 
     if form.nonlinear:
         return jax.vmap(one)(betas)

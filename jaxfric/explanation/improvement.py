@@ -10,9 +10,9 @@ from ..models import Model
 from ..simulation.errors import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import verification
-from .acceptance import LEAST_SHARE
 from .figures import Figures
 from .findings import Findings
+from .problem import LEAST_SHARE
 from .regression import Fit
 
 # A figure that is larger by less than a hundredth of itself, and not more than by chance, is not

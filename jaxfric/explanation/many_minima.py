@@ -11,17 +11,25 @@ import numpy as np
 
 from ..terms.effect import scattered
 from .burdens import largest
-from .candidates import Candidate, CandidateSet
+from .candidates import Candidate, CandidateSet, coarse
 from .evidence import Evidence
+from .least_squares import orthonormal
 from .regression import Fit, fast, fit, gains
 
-# So many about each of the best, so often.
-AROUND, BEST, ROUNDS = 64, 3, 4
+# So many about each of the best, so often; and so many points of the grid are refined.
+AROUND, BEST, ROUNDS, NEAR = 63, 3, 4, 2
+# How often it is then looked along the valley of the best one.
+ALONG = 3
 # Of those scattered over the whole set, how many are looked at again.
 WORTH = 64
 # The part of the energy that what is found among thousands has to remove: the threshold of the grid
 # is not theirs.
 BEYOND_CHANCE = 0.5
+
+
+def noise(current: Fit) -> float:
+    """The energy of what a fit leaves that no law removes, N², by [`fast`][]."""
+    return len(current.residual) * fast(current) ** 2
 
 
 def among_many(
@@ -42,6 +50,7 @@ def among_many(
     def gained(betas: np.ndarray) -> np.ndarray:
         """The energy that the law removes, N², with no more of a load than the machine has."""
         most = largest(term, betas, current)
+        betas = coarse(term, betas)
         if not np.isfinite(most).all():
             return gains(term, seen, betas, basis)
         own = seen.columns(term, betas)[:, :, 0]
@@ -57,10 +66,13 @@ def among_many(
     def refined(some: np.ndarray) -> list[Fit]:
         return [fit([term], seen, [beta], 8, basis) for beta in np.unique(some, axis=0)]
 
-    near = refined(starts)
+    def best_of(some: np.ndarray, count: int) -> np.ndarray:
+        return some[np.argsort(-gained(some), kind="stable")[:count]]
+
+    near = refined(best_of(starts, NEAR))
     near = [each for each in near if within(each)] or near
     best_near = min(near, key=lambda each: each.energy)
-    if len(current.residual) * fast(current) ** 2 > (1 - BEYOND_CHANCE) * current.energy:
+    if noise(current) > (1 - BEYOND_CHANCE) * current.energy:
         return best_near  # of noise nothing can be removed
     kept, form = field.kept_betas, candidate.form
     here = form, *map(jax.tree.structure, current.terms)
@@ -69,7 +81,7 @@ def among_many(
         best, rounds = starts, range(ROUNDS)
         wide = kept[form] if form in kept else field.scattered(candidate, seen)
         if len(wide):
-            wide = wide[np.argsort(-gained(wide), kind="stable")[:WORTH]]
+            wide = best_of(wide, WORTH)
             kept[form] = wide
             best = np.concatenate([starts, wide[: 2 * BEST]])
     values = [np.log(np.unique(each)) for each in candidate.betas.T]
@@ -78,11 +90,28 @@ def among_many(
     for number in rounds:
         spread = np.exp(scatter * step / 2**number)
         tried = np.concatenate([best, *(each * spread for each in best)])
-        best = tried[np.argsort(-gained(tried), kind="stable")[:BEST]]
+        best = best_of(tried, BEST)
     kept[here] = best
     far = [each for each in refined(best) if within(each)]
     far = far or [fit([term], seen, [best[0]], 0, basis)]
     found = min(far, key=lambda each: each.energy)
+    for number in range(ALONG):
+        again = refined(best_of(_along(found, AROUND, 0.5**number), 1))
+        found = min((found, *filter(within, again)), key=lambda each: each.energy)
     if found.energy > (1 - BEYOND_CHANCE) * current.energy:
         return best_near
     return min((found, best_near), key=lambda each: (not within(each), each.energy))
+
+
+def _along(found: Fit, count: int, part: float) -> np.ndarray:
+    """β scattered along the valley of a fit's energy, `(count, d)`: by a part of the way over which
+    the energy would double, were it a parabola.
+    """
+    beta = found.betas[0]
+    basis = orthonormal(found.columns)
+    slopes = found.slopes * beta
+    slopes = slopes - basis @ (basis.T @ slopes)
+    values, ways = np.linalg.eigh(slopes.T @ slopes)
+    # No further than the parameter itself.
+    reach = np.sqrt(found.energy / np.maximum(values, found.energy))
+    return beta * np.exp((2 * scattered(count, len(beta)) - 1) * part * reach @ ways.T)

@@ -17,7 +17,12 @@ from .reversals import creeps, yields
 from .significance import blocks
 from .threads import each
 
-# Alignments that differ by less than this part of a sample make no difference worth another search.
+# Least part of the mean-square residual that a term must remove. Below it the amplitude is under a
+# sixth of the residual's, where held forces, encoder counts and smoothed velocities leave traces of
+# their own.
+LEAST_SHARE = 0.03
+# Alignments that differ by less than this part of a sample, and explain next to nothing of what is
+# left, make no difference worth another search.
 ALIGNED = 0.1
 
 
@@ -100,8 +105,9 @@ def realigned(recording: Recording | Motion, problem: Problem, known: Fit) -> Pr
     """The problem aligned by another model; itself where that makes no difference."""
     motion, in_slip = motion_of(recording), problem.in_slip or problem
     kernels = in_slip.evidence, in_slip.wide
-    later = _later(*kernels, in_slip.delay, known)
-    if abs(later - in_slip.delay) <= ALIGNED * in_slip.evidence.limits.interval:
+    later, part = _later(*kernels, in_slip.delay, known)
+    near = abs(later - in_slip.delay) <= ALIGNED * in_slip.evidence.limits.interval
+    if near and part < LEAST_SHARE:
         return problem
     kernels = _taken_later(motion, *kernels, later)
     evidence, wide, delay = _aligned_by(motion, *kernels, later, known)
@@ -145,7 +151,7 @@ def _aligned_by(
     """
     for _ in range(3):
         last = delay
-        delay = _later(evidence, wide, delay, known)
+        delay, _ = _later(evidence, wide, delay, known)
         evidence, wide = _taken_later(motion, evidence, wide, delay)
         if abs(delay - last) < 0.5 * ALIGNED * evidence.limits.interval:
             break
@@ -159,11 +165,16 @@ def _taken_later(
     return there, None if wide is None else gather(motion, wide.width, delay)
 
 
-def _later(evidence: Evidence, wide: Evidence | None, delay: float, known: Fit) -> float:
-    """The delay, s, that is left after one more estimate; beyond a sample it is to be found."""
+def _later(
+    evidence: Evidence, wide: Evidence | None, delay: float, known: Fit
+) -> tuple[float, float]:
+    """The delay, s, that is left after one more estimate, and the part of the energy that it
+    removes; beyond a sample it is to be found.
+    """
     sample = evidence.limits.interval
-    delay -= _lateness([evidence] if wide is None else [evidence, wide], known)
-    return -0.5 * sample if abs(delay) > sample else delay
+    late, part = _lateness([evidence] if wide is None else [evidence, wide], known)
+    delay -= late
+    return -0.5 * sample if abs(delay) > sample else delay, part
 
 
 def _assembled(
@@ -192,8 +203,9 @@ def _wider(
     return wide if wide.width > narrow.width else None
 
 
-def _lateness(kernels: list[Evidence], known: Fit) -> float:
-    """How much earlier the force is than belongs to the same instant as the position, s.
+def _lateness(kernels: list[Evidence], known: Fit) -> tuple[float, float]:
+    """How much earlier the force is than belongs to the same instant as the position, s, and the
+    part of the energy that this explains.
 
     A force that is held from sample to sample acts half a sample late; a controller that needs one
     cycle for its computation adds one. Within one sample either way this is a matter of logging and
@@ -204,14 +216,17 @@ def _lateness(kernels: list[Evidence], known: Fit) -> float:
     index = [i for i, term in enumerate(known.terms) if not traits(term).delays]
     terms, betas = [known.terms[i] for i in index], [known.betas[i] for i in index]
 
-    def late(evidence: Evidence) -> float:
+    def late(evidence: Evidence) -> tuple[float, float]:
         seen = with_predictions(evidence, known)
         current = fit(terms, seen, betas, 6)
         seen = with_predictions(seen, current)
         column = seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
         basis = current.basis()
         column = column - basis @ (basis.T @ column)
-        return float(column @ current.residual / max(column @ column, 1e-300))
+        along = float(column @ current.residual)
+        delay = along / max(float(column @ column), 1e-300)
+        return delay, along * delay / max(current.energy, 1e-300)
 
-    delays = each(late, kernels)
-    return delays[0] if abs(delays[0] - delays[-1]) < 0.5 * sample else delays[-1]
+    (narrow, part), *others = each(late, kernels)
+    wide = others[0] if others else (narrow, part)
+    return (narrow, part) if abs(narrow - wide[0]) < 0.5 * sample else wide

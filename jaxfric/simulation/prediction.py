@@ -170,9 +170,10 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
         # speed: as much as the force has had.
         lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
         momentum = partial(_momentum_of, model.only(lambda term: not _late(term)))
-    if any(map(_stepped, summands(model.term))):
-        force = partial(_with_smooth_pushes, model, motion)
-    rate = _rate(momentum(prepared), prepared, motion.choices[-1], motion.step)
+    moved = momentum(prepared)
+    if len(motion.choices) > 1 and any(map(_stepped, summands(model.term))):
+        moved = moved + _smoothing_of_loads(model, motion, prepared)
+    rate = _rate(moved, prepared, motion.choices[-1], motion.step)
     return later(prepared, force(prepared) + rate + lagging, delay)
 
 
@@ -203,34 +204,25 @@ def _stepped(term: AbstractTerm) -> TypeGuard[AbstractStates]:
     return isinstance(term, AbstractStates) and term.stepped
 
 
-def _with_smooth_pushes(model: Model, motion: Prepared, prepared: Recording):
-    """The force without the rate of the momentum, N, `(N,)`, what loads push being smoothed.
+def _smoothing_of_loads(model: Model, motion: Prepared, prepared: Recording):
+    """What smoothing takes of the loads' momentum, N·s, `(N,)`, where the motor's speed is derived.
 
-    A load that swings swings the motor. Of that the derivative of the motor's momentum holds what
-    it does not smooth, and as much has to be left of the push. The friction that the load takes
-    from the motor jumps as the motor's own does, and is not smoothed.
+    A load that swings swings the motor. What of that is not seen in the motor's speed, since its
+    derivative is smoothed, must not be left in the load's either.
     """
     total = jnp.zeros_like(prepared.time)
-    if not all(map(_stepped, summands(model.term))):
-        total = model.only(lambda term: not _stepped(term)).force(prepared)
-    side = jnp.sign(prepared.velocity)
-    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
-        if _stepped(term):
-            friction = side * (jnp.stack([*map(jnp.asarray, term.relief)]) @ alpha)
-            push = weighed(term.columns(prepared), alpha) + friction
-            total = total + _smoothed(push, prepared, motion) - friction
-    return total
-
-
-def _smoothed(signal: Float[Array, " N"], prepared: Recording, motion: Prepared):
-    """A signal as smooth as the acceleration, `(N,)`: each derivative by which that is taken, of
-    the signal's integral.
-    """
     between = jnp.where(starts(prepared), 0.0, jnp.diff(prepared.time, prepend=prepared.time[:1]))
-    for choice in motion.choices:
-        mean = 0.5 * (signal + jnp.concatenate([signal[:1], signal[:-1]]))
-        signal = _rate(jnp.cumsum(mean * between), prepared, choice, motion.step)
-    return signal
+    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+        if not _stepped(term):
+            continue
+        inertia = jnp.stack([*map(jnp.asarray, term.shed)]) @ alpha
+        load = weighed(term.momentum(prepared), alpha) + inertia * prepared.velocity
+        smooth = load
+        for choice in motion.choices[:-1]:
+            mean = 0.5 * (smooth + jnp.concatenate([smooth[:1], smooth[:-1]]))
+            smooth = _rate(jnp.cumsum(mean * between), prepared, choice, motion.step)
+        total = total + smooth - load
+    return total
 
 
 def _by_samples(model: Model) -> bool:

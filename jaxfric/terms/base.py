@@ -108,6 +108,12 @@ class AbstractTerm(eqx.Module):
         The derivative is never taken on the data: the projection puts it on its kernel.
         """
 
+    def columns_and_momentum(
+        self, recording: Recording
+    ) -> tuple[Float[Array, "N p"], Float[Array, "N p"] | None]:
+        """Both, which some laws find in one go; `None` for no momentum."""
+        return self.columns(recording), self.momentum(recording) if self.inertial else None
+
     @abstractmethod
     def offset(self, recording: Recording) -> Float[Array, " N"]:
         """The known part f0 of the term, N, shape `(N,)`."""

@@ -1,5 +1,6 @@
 """What lies between motor and load, as far as one mass can tell."""
 
+import math
 from typing import NamedTuple
 
 import jax
@@ -21,66 +22,184 @@ def _coasting(scales):
 OCTAVES = Resolution(0, 1, None, 12)
 DECELERATION = Parameter("load_deceleration", ACCELERATION, _coasting, resolution=OCTAVES)
 
-# Steps between samples.
-_STEPS = 4
+
+class _Flank(NamedTuple):
+    """A load on a spring and a damper: dw/dt = p − d sign(w) − κ w, p = ω² o + 2ζω do/dt.
+
+    `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. All within a step is along
+    the way in which the spring is wound up by o, m. Viscous friction is what it is as a step of
+    touch begins, of which it changes the speed by no more than a few per cent.
+    """
+
+    omega: Float[Array, ""]
+    damping: Float[Array, ""] | float
+    deceleration: Float[Array, ""]
+    decay: Float[Array, ""] | float
+
+    def push(self, over, slip):
+        """p, m/s², where the motor is faster by `slip`, m/s."""
+        return self.omega * (self.omega * over + 2 * self.damping * slip)
+
+    def swing(self, time):
+        """The damped oscillation after a time t, s: e^−ζωt cos ω₁t and e^−ζωt sin ω₁t/ω₁."""
+        rate = self.damping * self.omega
+        fade = jnp.exp(-rate * time)
+        if isinstance(self.damping, float) and self.damping < 1:
+            own = self.omega * math.sqrt(1 - self.damping**2)
+            return fade * jnp.cos(own * time), fade * jnp.sin(own * time) / own
+        square = 1 - jnp.square(self.damping)
+        own = self.omega * jnp.sqrt(jnp.maximum(jnp.abs(square), 1e-6))
+        slow, fast = jnp.exp(-(self.omega**2) / (rate + own) * time), jnp.exp(-(rate + own) * time)
+        cosine = jnp.where(square > 0, fade * jnp.cos(own * time), 0.5 * (slow + fast))
+        sine = jnp.where(square > 0, fade * jnp.sin(own * time), 0.5 * (slow - fast))
+        return cosine, sine / own
+
+    def touching(self, over, load, motor, gain, side, time, swing):
+        """What o and w are after a time in touch, and the impulse of p, m/s.
+
+        `motor`, m/s, and `gain`, m/s², its speed and acceleration; `side`, that of the friction, 0
+        of a load that sticks; `swing`, of that time.
+        """
+        cosine, sine = swing
+        rate, slip = self.damping * self.omega, motor - load
+        steady = gain + self.deceleration * side + self.decay * load
+        from_rest = over - steady / self.omega**2
+        change = from_rest * (cosine + rate * sine - 1) + slip * sine
+        slips = slip * (cosine - rate * sine) - self.omega**2 * sine * from_rest
+        after = motor + gain * time - slips
+        # Held by its friction.
+        way = time * (motor + 0.5 * gain * time)
+        held = self.push((over + 0.5 * way) * time, way)
+        sticks = side == 0
+        return (
+            over + jnp.where(sticks, way, change),
+            jnp.where(sticks | (after * side < 0), 0.0, after),
+            jnp.where(sticks, held, steady * time - (slips - slip)),
+        )
+
+    def flying(self, ahead, load, motor, gain, time):
+        """By how much the motor is ahead, and w, after a time without touch."""
+        speed = jnp.abs(load)
+        slowed = self.deceleration + 0.5 * self.decay * speed
+        after = jnp.maximum(speed - time * slowed, 0.0) / (1 + 0.5 * self.decay * time)
+        after = jnp.sign(load) * after
+        way = 0.5 * (load + after) * jnp.minimum(time, speed / slowed)
+        return ahead + time * (motor + 0.5 * gain * time) - way, after
 
 
-def pushed(
+def _swung(flank: _Flank, state, motor, gain, span, swing):
+    """One step of a load on a spring that pushes and pulls."""
+    ahead, load = state
+    push = flank.push(ahead, motor - load)
+    breaks = jnp.where(jnp.abs(push) > flank.deceleration, jnp.sign(push), 0.0)
+    side = jnp.where(load == 0, breaks, jnp.sign(load))
+    ahead, load, impulse = flank.touching(ahead, load, motor, gain, side, span, swing)
+    return (ahead, load), impulse
+
+
+def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
+    """One step of a load behind a gap, whose flanks do not pull.
+
+    A load in touch swings until the flank would pull, and then it flies; one that flies may strike
+    a flank, and swings from then on.
+    """
+    ahead, load = state
+    place = jnp.sign(ahead)
+    over = jnp.abs(ahead) - half_gap
+    push = flank.push(over, place * (motor - load))
+    touches = (over >= 0) & (push >= 0)
+    breaks = jnp.where(touches & (push > flank.deceleration), place, 0.0)
+    side = jnp.where(load == 0, breaks, jnp.sign(load))
+    # In touch throughout: when it would pull.
+    along = place * load, place * motor, place * gain, place * side
+    last, speed, _ = flank.touching(over, *along, span, swing)
+    pulls = flank.push(last, place * (motor + gain * span) - speed)
+    leaves = touches & (pulls < 0) & (side != 0)
+    left = span * push / jnp.where(leaves, push - pulls, 1.0)
+    # In flight throughout: when it would strike.
+    beyond, slowed = flank.flying(ahead, load, motor, gain, span)
+    strikes = ~touches & (jnp.abs(ahead) <= half_gap) & (jnp.abs(beyond) > half_gap)
+    facing = jnp.sign(beyond)
+    room, nearing = half_gap - facing * ahead, facing * (motor - load)
+    bend = facing * (gain - (slowed - load) / jnp.where(span > 0, span, 1.0))
+    square = nearing**2 + 2 * bend * room
+    root = nearing + jnp.sqrt(jnp.where(square > 0, square, 1.0))
+    strikes &= (square > 0) & (root > 0)
+    reached = jnp.clip(2 * room / jnp.where(strikes, root, 1.0), 0.0, span)
+    # Flight up to the flank, touch, and flight from it.
+    before = jnp.where(touches, 0.0, jnp.where(strikes, reached, span))
+    ahead, load = flank.flying(ahead, load, motor, gain, before)
+    facing = jnp.where(touches, place, facing)
+    time = jnp.where(leaves, left, span - before)
+    now = motor + gain * before
+    slips = jnp.where(load == 0, facing, jnp.sign(load))
+    side = jnp.where(touches, side, slips)
+    along = facing * load, facing * now, facing * gain, facing * side
+    over = facing * ahead - half_gap
+    over, speed, impulse = flank.touching(over, *along, time, flank.swing(time))
+    met = touches | strikes
+    ahead = jnp.where(met, facing * (over + half_gap), ahead)
+    load = jnp.where(met, facing * speed, load)
+    impulse = jnp.where(met, facing * impulse, 0.0)
+    rest = jnp.where(leaves, span - time, 0.0)
+    return flank.flying(ahead, load, now + gain * time, gain, rest), impulse
+
+
+def load_motion(
     recording: Recording,
     omega: Float[Array, ""],
     damping: Float[Array, ""] | float,
     deceleration: Float[Array, ""],
     half_gap: Float[Array, ""] | float | None = None,
     decay: Float[Array, ""] | float = 0.0,
-) -> Float[Array, " N"]:
-    """What a load with friction is pushed by, per mass, m/s², `(N,)`.
+) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """What a load's friction takes of its push, per mass, f, m/s², and its speed w, m/s, `(N,)`.
 
-    For its speed w, dw/dt = p − d sign(w) − κ w, and at rest it sticks. Without `half_gap`
+    The push p = f + dw/dt, with f = d sign(w) + κ w, and p itself where the load sticks. So what
+    strikes the load is in w, and is smoothed as the motor's own speed is. Without `half_gap`
     p = ω² s + 2ζω ds/dt, s, m, the way by which the motor, at the recording's position, is ahead;
     with it, δ, the spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s;
-    `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. Stepped semi-implicitly, stable for any
-    stiffness. A segment starts in slip.
+    `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. The motor's speed is straight between the
+    samples; touch and flight are solved exactly, to where the one ends and the other begins, once
+    between two samples, for any stiffness. A segment starts in slip.
     """
     begins, speed = starts(recording), recording.velocity
-    span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0))) / _STEPS
-    way = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.position), (1, 0))) / _STEPS
+    span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0)))
+    way = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.position), (1, 0)))
     last = jnp.where(begins, speed, jnp.roll(speed, 1))
-    stiffness, drag = omega**2, 2 * damping * omega
+    real = jnp.where(span > 0, span, 1.0)
+    gain = jnp.where(span > 0, (speed - last) / real, 0.0)
+    # So that the motor goes the way that its position says.
+    first = jnp.where(span > 0, way / real - 0.5 * gain * span, speed)
+    flank = _Flank(omega, damping, deceleration, decay)
     gap = 0.0 if half_gap is None else half_gap
-
-    def substep(state, span, way, speed):
-        ahead, load = state
-        ahead = ahead + way - span * load
-        over = jnp.sign(ahead) * jnp.maximum(jnp.abs(ahead) - gap, 0.0)
-        push = stiffness * over + drag * (speed - load)
-        push = push if half_gap is None else jnp.where(push * over > 0, push, 0.0)
-        push = push / (1 + span * drag + span**2 * stiffness)
-        free = load + span * push
-        left = jnp.maximum(jnp.abs(free) - span * deceleration, 0.0)
-        return (ahead, jnp.sign(free) * left / (1 + span * decay)), push
+    dtype = jnp.result_type(omega, deceleration, gap)
+    span, first, gain, speed = (each.astype(dtype) for each in (span, first, gain, speed))
 
     def step(state, now):
-        span, way, last, speed, begin = now
-        total = jnp.zeros_like(speed)
-        for number in range(_STEPS):
-            at = last + (number + 0.5) / _STEPS * (speed - last)
-            state, push = substep(state, span, way, at)
-            total = total + push / _STEPS
-        ahead, load = state
+        span, first, gain, speed, begin, swing = now
+        before = state[1]
+        motion = first, gain, span, swing
+        if half_gap is None:
+            (ahead, load), impulse = _swung(flank, state, *motion)
+        else:
+            (ahead, load), impulse = _struck(flank, half_gap, state, *motion)
         side = jnp.sign(speed)
         slips = side * deceleration + decay * speed
-        wound = side * gap + slips / stiffness
+        wound = side * gap + slips / omega**2
         state = jnp.where(begin, wound, ahead), jnp.where(begin, speed, load)
-        return state, jnp.where(begin, slips, total)
+        held = (impulse - (load - before)) / jnp.where(span > 0, span, 1.0)
+        return state, (jnp.where(begin, slips, held), state[1])
 
-    zero = jnp.zeros_like(speed[0])
-    push = jax.lax.scan(step, (zero, zero), (span, way, last, speed, begins))[1]
+    start = 2 * (jnp.zeros((), dtype),)
+    steps = span, first, gain, speed, begins, flank.swing(span)
+    held, load = jax.lax.scan(step, start, steps)[1]
     # Means over the spans before the samples; what is wanted belongs to the samples.
-    return 0.5 * (push + jnp.where(jnp.roll(begins, -1), push, jnp.roll(push, -1)))
+    return 0.5 * (held + jnp.where(jnp.roll(begins, -1), held, jnp.roll(held, -1))), load
 
 
 class DryLoad(NamedTuple):
-    """The load of [`pushed`][] as states of the axis, of the same parameters.
+    """The load of [`load_motion`][] as states of the axis, of the same parameters.
 
     `flow` is (s, w): the way by which the motor is ahead, m, and the load's speed, m/s. `kept` is
     what holds for a step: the direction of the load's friction, and the flank in touch, 0 for none.

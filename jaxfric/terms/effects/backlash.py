@@ -18,7 +18,7 @@ from ..base import AbstractTerm
 from ..effect import Effect, Extent, View, even, inside, product, scattered
 from ..presliding import AbstractStates, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, OCTAVES, DryLoad, pushed
+from ..transmission import DECELERATION, OCTAVES, DryLoad, load_motion
 from .compliance import coasting
 
 
@@ -112,7 +112,7 @@ _FLANKS = 0.2
 class ElasticBacklash(AbstractStates):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
-    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`pushed`).
+    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`load_motion`).
     `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
     is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
     """
@@ -142,14 +142,18 @@ class ElasticBacklash(AbstractStates):
 
         return Burden(float(alpha[0] / beta[2]), float(alpha[0]), lighter=lighter)
 
-    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
-        return -recording.velocity[:, None] / self.load_deceleration
-
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        omega = jnp.sqrt(self.load_deceleration / self.windup)
+        return self.columns_and_momentum(recording)[0]
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return self.columns_and_momentum(recording)[1]
+
+    def columns_and_momentum(self, recording):
         load = self.load_deceleration, self.half_gap, self.decay
-        push = pushed(recording, omega, _FLANKS, *load)
-        return (push / self.load_deceleration - jnp.sign(recording.velocity))[:, None]
+        held, speed = load_motion(recording, self.pace, _FLANKS, *load)
+        plain = held / self.load_deceleration - jnp.sign(recording.velocity)
+        plain -= self.decay / self.load_deceleration * recording.velocity
+        return plain[:, None], (speed - recording.velocity)[:, None] / self.load_deceleration
 
     @property
     def _load(self) -> DryLoad:
@@ -215,9 +219,6 @@ class DampedBacklash(ElasticBacklash):
     def burden(self, beta, alpha) -> Burden:
         burden = super().burden(beta[:3], alpha)
         return burden._replace(lighter=lambda factor: beta * np.array([1.0, 1.0, factor, 1.0]))
-
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        return super().columns(recording) - recording.velocity[:, None] / self.viscous_speed
 
     def present(self, states, now):
         return super().present(states, now) - now.velocity / self.viscous_speed

@@ -20,7 +20,7 @@ from ..base import AbstractTerm
 from ..effect import GRID, Effect, Extent, View, inside
 from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, DryLoad, pushed
+from ..transmission import DECELERATION, DryLoad, load_motion
 
 
 def _resonance_bounds(scales):
@@ -175,7 +175,7 @@ _DRY = Resolution(0, 4, None, 32)
 class DryCompliance(AbstractStates):
     """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
 
-    M_L p is what the spring pushes the load by (`pushed`): [`Compliance`][] for a load whose
+    M_L p is what the spring pushes the load by (`load_motion`): [`Compliance`][] for a load whose
     friction lets it stick, M_L d of it. `load_inertia` M_L, kg; `load_resonance` ω/2π, Hz;
     `damping_ratio` ζ; `load_deceleration` d, m/s².
     """
@@ -203,13 +203,17 @@ class DryCompliance(AbstractStates):
         give = slow / (2 * np.pi * resonance) ** 2
         return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give)
 
-    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
-        return -recording.velocity[:, None]
-
     def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        omega = 2 * jnp.pi * self.load_resonance
-        push = pushed(recording, omega, self.damping_ratio, self.load_deceleration)
-        return (push - self.load_deceleration * jnp.sign(recording.velocity))[:, None]
+        return self.columns_and_momentum(recording)[0]
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return self.columns_and_momentum(recording)[1]
+
+    def columns_and_momentum(self, recording):
+        load = self.damping_ratio, self.load_deceleration
+        held, speed = load_motion(recording, self.pace, *load)
+        plain = held - self.load_deceleration * jnp.sign(recording.velocity)
+        return plain[:, None], (speed - recording.velocity)[:, None]
 
     @property
     def _load(self) -> DryLoad:
