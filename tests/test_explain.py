@@ -705,8 +705,8 @@ def test_a_tone_of_the_motions_own_is_believed_where_it_is_all(healthy):
 
     def named(run):
         posed = problem.problem_of(run, models.named("gaussian"))
-        mine = [c for c in posed.candidate_set.candidates if c.effect.name == tone]
-        posed.candidate_set.candidates = mine
+        groups = posed.candidate_set.groups
+        posed.candidate_set.groups = [some for some in groups if some[0].effect.name == tone]
         return stepwise.select(posed).selected
 
     alone = planted(healthy[0], terms.PeriodicDisturbance(), (1.5, -1.0), (rates[0],))
@@ -791,8 +791,8 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
         run = planted(healthy[0], terms.PayloadChange(), (1.0, 2.0), (moment,))
         posed = problem.problem_of(run, models.named("gaussian"))
         seen = predictions.with_predictions(posed.evidence, posed.base)
-        mine = (isinstance(c.term, terms.PayloadChange) for c in posed.candidate_set.candidates)
-        step = posed.candidate_set.candidates[list(mine).index(True)]
+        every = [each for some in posed.candidate_set.groups for each in some]
+        step = next(each for each in every if isinstance(each.term, terms.PayloadChange))
         grid, basis = step.betas[:, 0], posed.base.basis()
         trial = contest.Trial(step, step.betas[0], 0.1, 0.01, 1, 0.002, 0.01, 1.0)
         below, above = np.searchsorted(grid, moment) + [-1, 0]
@@ -806,7 +806,7 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
         target = seen.target - basis @ (basis.T @ seen.target)
         least = target @ target - regression.gains(step.term, seen, every, basis).max()
         assert all(each.energy < 1.02 * least for each in found)
-    waves = [c for c in posed.candidate_set.candidates if c.lines is not None]
+    waves = [c for some in posed.candidate_set.groups for c in some if c.lines is not None]
     assert all(not len(contest._between(trial._replace(candidate=c))) for c in waves)
 
 
@@ -828,6 +828,7 @@ def test_force_and_motion_are_aligned_by_the_first_term_before_others_compete(he
     assert first and not whole and one == all_ == 1 and before != after
     searches.clear()
     monkeypatch.setattr(problem, "ALIGNED", 10.0)  # the same rows: the search goes on
+    monkeypatch.setattr(problem, "LEAST_SHARE", 1.0)
     found = search.searched(motion_of(run), problem.problem_of(run, models.named("gaussian")), 0)
     assert len({delay for delay, *_ in searches}) == 1 and len(searches) == 2
     assert found.selection.selected[0].effect.name == "cogging"
@@ -884,7 +885,7 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     term, alpha, beta = CASES["cogging"]
     run = planted(healthy[0], term, alpha, beta)
     posed = problem.problem_of(run, models.named("gaussian"))
-    monkeypatch.setattr(stepwise, "_pruned", lambda evidence, now, taken, size: (posed.base, []))
+    monkeypatch.setattr(stepwise, "_pruned", lambda seen, *known: (posed.base, seen, []))
     found = stepwise.select(posed)
     assert found.selected == []
 

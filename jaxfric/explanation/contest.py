@@ -10,7 +10,7 @@ import numpy as np
 from ..terms.effect import Effect
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
-from .many_minima import BEYOND_CHANCE, among_many, noise
+from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains
 from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
@@ -248,12 +248,18 @@ def _finals(
     ordered = sorted(enumerate(trials), key=lambda pair: not pair[1].candidate.term.stepped)
     done = [found for found in each(final, ordered) if found is not None]
     # The grid may show none of the minima of a law of many.
-    least = (1 - BEYOND_CHANCE) * min((found.energy for found in done), default=current.energy)
-    if least > noise(current):
+    least = min((found.energy for found in done), default=current.energy)
+    if (1 - BEYOND_CHANCE) * least > noise(current):
         tried = {id(found.trial) for found in done}
         left = [t for t in trials if t.effect.scatter and t.candidate.term.stepped]
-        late = [_refined(seen, current, field, t, basis) for t in left if id(t) not in tried]
-        done += filter(None, [assessed(found) for found in late if found.energy < least])
+        for trial in [each for each in left if id(each) not in tried]:
+            # Half of what the best of the others removes, as of these.
+            most = promise(trial.candidate, seen, current, field, basis)
+            if most < 0.5 * (current.energy - least):
+                continue
+            found = assessed(_refined(seen, current, field, trial, basis))
+            if found is not None and found.energy < (1 - BEYOND_CHANCE) * least:
+                done.append(found)
     return sorted(done, key=lambda finalist: -finalist.score)
 
 

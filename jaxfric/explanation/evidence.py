@@ -126,6 +126,25 @@ class Evidence(NamedTuple):
         first = np.asarray(plain)[0]
         return first, np.zeros_like(first) if momentum is None else np.asarray(momentum)[0]
 
+    def stretch(self, first: int, nodes: int) -> "tuple[Evidence, np.ndarray]":
+        """The rows within so many nodes from one on, and which these are, `(J,)`."""
+        first -= first % STRIDE
+        chosen = slice(first, first + nodes)
+        windows = slice(first // STRIDE, (first + nodes - 2 * NODES - 1) // STRIDE + 1)
+        inside = (self.rows >= windows.start) & (self.rows < windows.stop)
+        motion = jax.tree.map(lambda values: values[chosen], self.motion)
+        rows = {name: getattr(self, name)[inside] for name in ("force", "target", "side")}
+        return self._replace(
+            motion=motion,
+            nodes=len(motion.time),
+            average=self.average[windows],
+            slope=self.slope[windows],
+            rows=self.rows[inside] - windows.start,
+            centre=self.centre[inside] - first,
+            elapsed=self.elapsed[chosen],
+            **rows,
+        ), inside
+
     def with_channels(self, **channels: np.ndarray) -> "Evidence":
         """The same with more signals at the nodes, each `(M,)`."""
         added = {name: jnp.asarray(value) for name, value in channels.items()}

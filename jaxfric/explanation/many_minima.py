@@ -6,9 +6,12 @@ grid, then over half of that, and so on. Where the same law was tried beside the
 for a force taken a little later, what was found then is where this begins.
 """
 
+from typing import NamedTuple
+
 import jax
 import numpy as np
 
+from ..terms.base import AbstractTerm
 from ..terms.effect import scattered
 from .burdens import largest
 from .candidates import Candidate, CandidateSet, coarse
@@ -20,6 +23,10 @@ from .regression import Fit, fast, fit, gains
 AROUND, BEST, ROUNDS, NEAR = 63, 3, 4, 2
 # How often it is then looked along the valley of the best one.
 ALONG = 3
+# Steps of a refinement, which the valley's bends end sooner.
+STEPS = 5
+# Nodes of which all this asks, where there are half as many again: eight to twenty strokes.
+LONGEST, SPARE = 1 << 13, 1.5
 # Of those scattered over the whole set, how many are looked at again.
 WORTH = 64
 # The part of the energy that what is found among thousands has to remove: the threshold of the grid
@@ -30,6 +37,66 @@ BEYOND_CHANCE = 0.5
 def noise(current: Fit) -> float:
     """The energy of what a fit leaves that no law removes, N², by [`fast`][]."""
     return len(current.residual) * fast(current) ** 2
+
+
+class _Stretch(NamedTuple):
+    """The stretch of a motion in which a fit leaves most: its rows, what is left of them beside the
+    basis there, N, `(J,)`, and the energy of the whole by that of the stretch.
+    """
+
+    seen: Evidence
+    basis: np.ndarray
+    left: np.ndarray
+    whole: float
+
+    def gained(self, term: AbstractTerm, betas: np.ndarray, current: Fit) -> np.ndarray:
+        """The energy, N², `(G,)`, that a law removes there, with no more of a load than the
+        machine has.
+        """
+        if not len(betas):
+            return np.zeros(0)
+        most = largest(term, betas, current)
+        betas = coarse(term, betas)
+        if not np.isfinite(most).all():
+            return gains(term, self.seen, betas, self.basis)
+        own = self.seen.columns(term, betas)[:, :, 0]
+        own = own - (own @ self.basis) @ self.basis.T
+        along, square = own @ self.left, np.einsum("gj,gj->g", own, own)
+        size = np.clip(along / np.where(square > 0, square, 1.0), 0.0, most)
+        return size * (2 * along - size * square)
+
+
+def _stretch(seen: Evidence, basis: np.ndarray) -> _Stretch:
+    left = seen.target - basis @ (basis.T @ seen.target)
+    if seen.nodes <= SPARE * LONGEST:
+        return _Stretch(seen, basis, left, 1.0)
+    power = np.cumsum(np.bincount(seen.centre, left**2, seen.nodes + 1))
+    first = int(np.argmax(power[LONGEST:] - power[:-LONGEST]))
+    part, inside = seen.stretch(first, LONGEST)
+    basis = orthonormal(basis[inside])
+    here = part.target - basis @ (basis.T @ part.target)
+    return _Stretch(part, basis, here, float(left @ left) / max(float(here @ here), 1e-300))
+
+
+def promise(
+    candidate: Candidate, seen: Evidence, current: Fit, field: CandidateSet, basis: np.ndarray
+) -> float:
+    """The most energy, N², that a law removes at any β scattered over its set."""
+    rows = _stretch(seen, basis)
+    wide = _wide(candidate, rows, current, field)
+    return rows.whole * float(np.max(rows.gained(candidate.term, wide, current), initial=0.0))
+
+
+def _wide(candidate: Candidate, rows: _Stretch, current: Fit, field: CandidateSet) -> np.ndarray:
+    """The best of the β that are scattered over a law's set, `(W, d)`; the first time, for the rows
+    and the fit that it is, for all that follow.
+    """
+    kept, form = field.kept_betas, candidate.form
+    if form not in kept:
+        every = field.scattered(candidate, rows.seen)
+        worth = np.argsort(-rows.gained(candidate.term, every, current), kind="stable")
+        kept[form] = every[worth[:WORTH]]
+    return kept[form]
 
 
 def among_many(
@@ -44,63 +111,52 @@ def among_many(
 
     Its load is a part of the machine. `starts`: the best β of its grid, `(S, d)`.
     """
-    term = candidate.term
-    left = seen.target - basis @ (basis.T @ seen.target)
-
-    def gained(betas: np.ndarray) -> np.ndarray:
-        """The energy that the law removes, N², with no more of a load than the machine has."""
-        most = largest(term, betas, current)
-        betas = coarse(term, betas)
-        if not np.isfinite(most).all():
-            return gains(term, seen, betas, basis)
-        own = seen.columns(term, betas)[:, :, 0]
-        own = own - (own @ basis) @ basis.T
-        along, square = own @ left, np.einsum("gj,gj->g", own, own)
-        size = np.clip(along / np.where(square > 0, square, 1.0), 0.0, most)
-        return size * (2 * along - size * square)
+    term, rows = candidate.term, _stretch(seen, basis)
 
     def within(found: Fit) -> bool:
         most = largest(term, np.stack(found.betas), current)
         return bool(np.all(found.alphas[0] <= most))
 
     def refined(some: np.ndarray) -> list[Fit]:
-        return [fit([term], seen, [beta], 8, basis) for beta in np.unique(some, axis=0)]
+        every = np.unique(some, axis=0)
+        return [fit([term], rows.seen, [beta], STEPS, rows.basis) for beta in every]
 
     def best_of(some: np.ndarray, count: int) -> np.ndarray:
-        return some[np.argsort(-gained(some), kind="stable")[:count]]
+        return some[np.argsort(-rows.gained(term, some, current), kind="stable")[:count]]
 
-    near = refined(best_of(starts, NEAR))
-    near = [each for each in near if within(each)] or near
-    best_near = min(near, key=lambda each: each.energy)
+    def of_all(found: Fit) -> Fit:
+        return found if rows.seen is seen else fit([term], seen, found.betas, STEPS, basis)
+
+    def less(one: Fit) -> tuple[bool, float]:
+        return not within(one), one.energy
+
+    near = of_all(min(refined(best_of(starts, NEAR)), key=less))
     if noise(current) > (1 - BEYOND_CHANCE) * current.energy:
-        return best_near  # of noise nothing can be removed
-    kept, form = field.kept_betas, candidate.form
-    here = form, *map(jax.tree.structure, current.terms)
+        return near  # of noise nothing can be removed
+    kept = field.kept_betas
+    here = candidate.form, *map(jax.tree.structure, current.terms)
     best, rounds = kept.get(here), range(ROUNDS - 1, ROUNDS)
     if best is None:
-        best, rounds = starts, range(ROUNDS)
-        wide = kept[form] if form in kept else field.scattered(candidate, seen)
-        if len(wide):
-            wide = best_of(wide, WORTH)
-            kept[form] = wide
-            best = np.concatenate([starts, wide[: 2 * BEST]])
+        wide, rounds = _wide(candidate, rows, current, field), range(ROUNDS)
+        best = np.concatenate([starts, best_of(wide, 2 * BEST)])
     values = [np.log(np.unique(each)) for each in candidate.betas.T]
     step = np.array([np.max(np.diff(each), initial=0.0) for each in values])
     scatter = 2 * scattered(AROUND, len(step)) - 1
     for number in rounds:
         spread = np.exp(scatter * step / 2**number)
-        tried = np.concatenate([best, *(each * spread for each in best)])
-        best = best_of(tried, BEST)
-    kept[here] = best
+        best = best_of(np.concatenate([best, *(each * spread for each in best)]), BEST)
     far = [each for each in refined(best) if within(each)]
-    far = far or [fit([term], seen, [best[0]], 0, basis)]
-    found = min(far, key=lambda each: each.energy)
-    for number in range(ALONG):
-        again = refined(best_of(_along(found, AROUND, 0.5**number), 1))
-        found = min((found, *filter(within, again)), key=lambda each: each.energy)
+    found = min(far or [fit([term], rows.seen, [best[0]], 0, rows.basis)], key=less)
+    part, enough = 1.0, (1 - BEYOND_CHANCE) * float(rows.left @ rows.left)
+    for _ in range(ALONG if found.energy < enough else 0):
+        [again] = refined(best_of(_along(found, AROUND, part), 1))
+        better = less(again) < less(found)
+        found, part = (again, part) if better else (found, part / 2)
+    kept[here] = np.concatenate([found.betas[0][None], best])[:BEST]
+    found = of_all(found)
     if found.energy > (1 - BEYOND_CHANCE) * current.energy:
-        return best_near
-    return min((found, best_near), key=lambda each: (not within(each), each.energy))
+        return near
+    return min((found, near), key=less)
 
 
 def _along(found: Fit, count: int, part: float) -> np.ndarray:

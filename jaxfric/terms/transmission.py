@@ -27,8 +27,8 @@ class _Flank(NamedTuple):
     """A load on a spring and a damper: dw/dt = p − d sign(w) − κ w, p = ω² o + 2ζω do/dt.
 
     `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. All within a step is along
-    the way in which the spring is wound up by o, m. Viscous friction is what it is as a step of
-    touch begins, of which it changes the speed by no more than a few per cent.
+    the way in which the spring is wound up by o, m. In touch the load's viscous friction is that at
+    the motor's speed: what it takes from the swing about that is little beside ζ.
     """
 
     omega: Float[Array, ""]
@@ -62,17 +62,17 @@ class _Flank(NamedTuple):
         """
         cosine, sine = swing
         rate, slip = self.damping * self.omega, motor - load
-        steady = gain + self.deceleration * side + self.decay * load
+        mean = motor + 0.5 * gain * time
+        steady = gain + self.deceleration * side + self.decay * mean
         from_rest = over - steady / self.omega**2
         change = from_rest * (cosine + rate * sine - 1) + slip * sine
         slips = slip * (cosine - rate * sine) - self.omega**2 * sine * from_rest
         after = motor + gain * time - slips
         # Held by its friction.
-        way = time * (motor + 0.5 * gain * time)
-        held = self.push((over + 0.5 * way) * time, way)
+        held = self.push((over + 0.5 * mean * time) * time, mean * time)
         sticks = side == 0
         return (
-            over + jnp.where(sticks, way, change),
+            over + jnp.where(sticks, mean * time, change),
             jnp.where(sticks | (after * side < 0), 0.0, after),
             jnp.where(sticks, held, steady * time - (slips - slip)),
         )

@@ -112,7 +112,8 @@ _FLANKS = 0.2
 class ElasticBacklash(AbstractStates):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
-    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by (`load_motion`).
+    F_L T is what the flanks push the load of friction F_L and inertia F_L/d by. Of that the
+    load's friction is the column, and its speed, beside the motor's, the momentum (`load_motion`).
     `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
     is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
     """
@@ -151,9 +152,10 @@ class ElasticBacklash(AbstractStates):
     def columns_and_momentum(self, recording):
         load = self.load_deceleration, self.half_gap, self.decay
         held, speed = load_motion(recording, self.pace, _FLANKS, *load)
-        plain = held / self.load_deceleration - jnp.sign(recording.velocity)
-        plain -= self.decay / self.load_deceleration * recording.velocity
-        return plain[:, None], (speed - recording.velocity)[:, None] / self.load_deceleration
+        motor = recording.velocity.astype(speed.dtype)
+        plain = held / self.load_deceleration - jnp.sign(motor)
+        plain -= self.decay / self.load_deceleration * motor
+        return plain[:, None], (speed - motor)[:, None] / self.load_deceleration
 
     @property
     def _load(self) -> DryLoad:

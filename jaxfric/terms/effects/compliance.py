@@ -212,8 +212,8 @@ class DryCompliance(AbstractStates):
     def columns_and_momentum(self, recording):
         load = self.damping_ratio, self.load_deceleration
         held, speed = load_motion(recording, self.pace, *load)
-        plain = held - self.load_deceleration * jnp.sign(recording.velocity)
-        return plain[:, None], (speed - recording.velocity)[:, None]
+        motor = recording.velocity.astype(speed.dtype)
+        return (held - self.load_deceleration * jnp.sign(motor))[:, None], (speed - motor)[:, None]
 
     @property
     def _load(self) -> DryLoad:
