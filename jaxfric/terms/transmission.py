@@ -1,6 +1,5 @@
 """What lies between motor and load, as far as one mass can tell."""
 
-import math
 from typing import NamedTuple
 
 import jax
@@ -27,8 +26,8 @@ class _Flank(NamedTuple):
     """A load on a spring and a damper: dw/dt = p − d sign(w) − κ w, p = ω² o + 2ζω do/dt.
 
     `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. All within a step is along
-    the way in which the spring is wound up by o, m. In touch the load's viscous friction is that at
-    the motor's speed: what it takes from the swing about that is little beside ζ.
+    the way in which the spring is wound up by o, m. With ζ < 1 the load swings in touch, however
+    large its viscous friction.
     """
 
     omega: Float[Array, ""]
@@ -40,15 +39,30 @@ class _Flank(NamedTuple):
         """p, m/s², where the motor is faster by `slip`, m/s."""
         return self.omega * (self.omega * over + 2 * self.damping * slip)
 
+    @property
+    def swings(self) -> bool:
+        """Whether the damping is a number that is known to leave a swing."""
+        return isinstance(self.damping, float) and self.damping < 1
+
+    @property
+    def viscous(self):
+        """κ in touch, 1/s."""
+        most = 2 * (1 - self.damping) * self.omega
+        return jnp.minimum(self.decay, 0.98 * most) if self.swings else self.decay
+
+    @property
+    def rate(self):
+        """By how much a second a swing fades, 1/s."""
+        return self.damping * self.omega + 0.5 * self.viscous
+
     def swing(self, time):
-        """The damped oscillation after a time t, s: e^−ζωt cos ω₁t and e^−ζωt sin ω₁t/ω₁."""
-        rate = self.damping * self.omega
-        fade = jnp.exp(-rate * time)
-        if isinstance(self.damping, float) and self.damping < 1:
-            own = self.omega * math.sqrt(1 - self.damping**2)
+        """The damped oscillation after a time t, s: e^−rt cos ω₁t and e^−rt sin ω₁t/ω₁."""
+        rate = self.rate
+        fade, square = jnp.exp(-rate * time), self.omega**2 - rate**2
+        if self.swings:
+            own = jnp.sqrt(square)
             return fade * jnp.cos(own * time), fade * jnp.sin(own * time) / own
-        square = 1 - jnp.square(self.damping)
-        own = self.omega * jnp.sqrt(jnp.maximum(jnp.abs(square), 1e-6))
+        own = jnp.sqrt(jnp.maximum(jnp.abs(square), 1e-6 * self.omega**2))
         slow, fast = jnp.exp(-(self.omega**2) / (rate + own) * time), jnp.exp(-(rate + own) * time)
         cosine = jnp.where(square > 0, fade * jnp.cos(own * time), 0.5 * (slow + fast))
         sine = jnp.where(square > 0, fade * jnp.sin(own * time), 0.5 * (slow - fast))
@@ -61,9 +75,9 @@ class _Flank(NamedTuple):
         of a load that sticks; `swing`, of that time.
         """
         cosine, sine = swing
-        rate, slip = self.damping * self.omega, motor - load
+        rate, slip = self.rate, motor - load
         mean = motor + 0.5 * gain * time
-        steady = gain + self.deceleration * side + self.decay * mean
+        steady = gain + self.deceleration * side + self.viscous * mean
         from_rest = over - steady / self.omega**2
         change = from_rest * (cosine + rate * sine - 1) + slip * sine
         slips = slip * (cosine - rate * sine) - self.omega**2 * sine * from_rest
@@ -74,7 +88,7 @@ class _Flank(NamedTuple):
         return (
             over + jnp.where(sticks, mean * time, change),
             jnp.where(sticks | (after * side < 0), 0.0, after),
-            jnp.where(sticks, held, steady * time - (slips - slip)),
+            jnp.where(sticks, held, steady * time - (slips - slip) - self.viscous * change),
         )
 
     def flying(self, ahead, load, motor, gain, time):
