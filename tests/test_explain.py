@@ -890,6 +890,31 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     assert found.selected == []
 
 
+def test_a_winner_beside_which_more_is_left_than_before_is_none(healthy, monkeypatch):
+    """As of a law that acts on the force that the model predicted without it."""
+    term, alpha, beta = CASES["cogging"]
+    posed = problem.problem_of(planted(healthy[0], term, alpha, beta), models.named("gaussian"))
+    genuine, tried = stepwise.joined, []
+
+    def worse(best, current, evidence):
+        tried.append(best.effect.name)
+        found, seen = genuine(best, current, evidence)
+        return found._replace(energy=2 * current.energy), seen
+
+    monkeypatch.setattr(stepwise, "joined", worse)
+    assert stepwise.select(posed).selected == [] and tried[0] == "cogging"
+
+
+def test_a_stretch_has_the_rows_of_the_whole(healthy):
+    whole = problem.problem_of(healthy[0], models.named("gaussian")).evidence
+    part, inside = whole.stretch(whole.nodes // 3, whole.nodes // 2)
+    assert 0 < inside.sum() == len(part.target) < len(whole.target)
+    for term in (terms.Viscous(), terms.Inertia()):
+        here, there = (each.columns(term, np.zeros((1, 0)))[0] for each in (part, whole))
+        np.testing.assert_array_equal(here, there[inside])
+    np.testing.assert_array_equal(part.target, whole.target[inside])
+
+
 @pytest.mark.slow
 def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     term, alpha, beta = CASES["friction_step"]
