@@ -1,7 +1,7 @@
 """One round of the contest: every candidate on the grid, the best refined with the whole model."""
 
 import dataclasses
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from itertools import chain
 from typing import Any, NamedTuple
 
@@ -110,38 +110,12 @@ def contest(
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     bootstrap = BlockBootstrap(current, block, seed)
 
-    def scanned(group: list[Candidate]) -> list[Scan]:
-        pairs = zip(group, field.columns(group, seen), strict=True)
-        return [bootstrap(columns, candidate.effect.positive) for candidate, columns in pairs]
-
     candidates = list(chain.from_iterable(field.groups))
-    scans = dict(zip(map(id, candidates), chain(*each(scanned, field.groups)), strict=True))
-    p_values = _p_values(scans.values())
-    best = {key: scan.gain[scan.best] for key, scan in scans.items()}
-    known = [best[key] for key, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
-    if known:  # the residual is no noise
-        doubtful = {
-            key
-            for key, p_value in zip(scans, p_values, strict=True)
-            if p_value > LEVEL and best[key] > max(known)
-        }
-
-        def again(group: list[Candidate]) -> dict[int, Scan]:
-            pairs = zip(group, field.columns(group, seen), strict=True)
-            return {
-                id(one): bootstrap.beside_structure(scans[id(one)], columns, one.effect.positive)
-                for one, columns in pairs
-                if id(one) in doubtful
-            }
-
-        groups = [some for some in field.groups if not doubtful.isdisjoint(map(id, some))]
-        for changed in each(again, groups):
-            scans |= changed
-        p_values = _p_values(scans.values())
-    least = thresholds(np.array([s.drawn for s in scans.values()]), LEVEL)
+    scans, p_values = _scanned(bootstrap, field, seen)
+    least = thresholds(np.array([s.drawn for s in scans]), LEVEL)
     trials = [
-        _trial(candidate, scans[id(candidate)], float(p), float(limit))
-        for candidate, p, limit in zip(candidates, p_values, least, strict=True)
+        _trial(candidate, scan, float(p), float(limit))
+        for candidate, scan, p, limit in zip(candidates, scans, p_values, least, strict=True)
     ]
     fast = fast_tone(seen, current)
     loud = [c for effect, term in tones(seen) for c in at_frequencies(effect, term, fast)]
@@ -162,7 +136,48 @@ def contest(
     return Contest(trials, finalists, size)
 
 
-def _p_values(scans: Collection[Scan]) -> np.ndarray:
+def _scanned(
+    bootstrap: BlockBootstrap, field: CandidateSet, seen: Evidence
+) -> tuple[list[Scan], np.ndarray]:
+    """The scans of all candidates, group by group, and their p-values, `(C,)`.
+
+    Where one is significant the residual is no noise. Then those that remove more and are not are
+    scanned again as beside structure.
+    """
+
+    def first(group: list[Candidate]) -> list[Scan]:
+        pairs = zip(group, field.columns(group, seen), strict=True)
+        return [bootstrap(columns, one.effect.positive) for one, columns in pairs]
+
+    groups = each(first, field.groups)
+    scans = list(chain.from_iterable(groups))
+    p_values = _p_values(scans)
+    known = [s.gain[s.best] for s, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
+    if not known:
+        return scans, p_values
+    doubtful = {
+        id(scan)
+        for scan, p_value in zip(scans, p_values, strict=True)
+        if p_value > LEVEL and scan.gain[scan.best] > max(known)
+    }
+
+    def again(pair: tuple[list[Candidate], list[Scan]]) -> list[Scan]:
+        group, own = pair
+        if doubtful.isdisjoint(map(id, own)):
+            return own
+        every = zip(group, own, field.columns(group, seen), strict=True)
+        return [
+            bootstrap.beside_structure(scan, columns, one.effect.positive)
+            if id(scan) in doubtful
+            else scan
+            for one, scan, columns in every
+        ]
+
+    scans = list(chain.from_iterable(each(again, zip(field.groups, groups, strict=True))))
+    return scans, _p_values(scans)
+
+
+def _p_values(scans: list[Scan]) -> np.ndarray:
     """p-values of the best group of each scan, corrected for all of them, `(C,)`."""
     return adjusted(np.array([s.gain[s.best] for s in scans]), np.array([s.drawn for s in scans]))
 

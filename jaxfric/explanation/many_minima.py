@@ -21,11 +21,11 @@ from .regression import Fit, fast, fit, gains
 
 # So many about each of the best, so often; and so many points of the grid are refined.
 AROUND, BEST, ROUNDS, NEAR = 63, 3, 4, 2
-# How often it is then looked along the valley of the best one.
-ALONG = 3
-# Steps of a refinement, which the valley's bends end sooner.
-STEPS = 5
-# Nodes of which all this asks, where there are half as many again: eight to twenty strokes.
+# How often it is then looked along the valley of the best one, and steps of each refinement: more
+# of either lowered the energy, but took seconds.
+ALONG, STEPS = 3, 5
+# Nodes of which all this asks, where there are half as many again: some two thousand rows, hundreds
+# for each parameter, and each of them steps the load.
 LONGEST, SPARE = 1 << 13, 1.5
 # Of those scattered over the whole set, how many are looked at again.
 WORTH = 64

@@ -169,12 +169,12 @@ def _later(
     evidence: Evidence, wide: Evidence | None, delay: float, known: Fit
 ) -> tuple[float, float]:
     """The delay, s, that is left after one more estimate, and the part of the energy that it
-    removes; beyond a sample it is to be found.
+    removes; beyond a sample it is to be found, and none of that is removed here.
     """
     sample = evidence.limits.interval
     late, part = _lateness([evidence] if wide is None else [evidence, wide], known)
     delay -= late
-    return -0.5 * sample if abs(delay) > sample else delay, part
+    return (-0.5 * sample, 0.0) if abs(delay) > sample else (delay, part)
 
 
 def _assembled(
