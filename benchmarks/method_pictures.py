@@ -48,8 +48,9 @@ def draws(problem):
         problem.base, significance.blocks(seen.elapsed[seen.centre], seen.reach)
     )
     scans = [
-        bootstrap(field.columns(candidate, seen), candidate.effect.positive)
-        for candidate in field.candidates
+        bootstrap(columns, candidate.effect.positive)
+        for group in field.groups
+        for candidate, columns in zip(group, field.columns(group, seen), strict=True)
     ]
     names = [candidate.effect.name for candidate in field.candidates]
     winner = int(np.argmax([scan.gain[scan.best] for scan in scans]))

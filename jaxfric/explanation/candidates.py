@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Hashable, Iterator
+from itertools import chain
 from typing import Any, NamedTuple
 
 import jax
@@ -87,6 +88,11 @@ class CandidateSet:
         own = _within(own, len(evidence.target))
         started = begin(functools.partial(_columns, seen), own)
         self._kept = dict(zip(map(id, own), started, strict=True))
+
+    @property
+    def candidates(self) -> list[Candidate]:
+        """All of them, group by group."""
+        return list(chain.from_iterable(self.groups))
 
     def serves(self, evidence: Evidence) -> bool:
         """Whether the columns are those of other evidence too: the same rows of the same motion.

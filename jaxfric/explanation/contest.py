@@ -110,7 +110,7 @@ def contest(
     block = blocks(seen.elapsed[seen.centre], seen.reach)
     bootstrap = BlockBootstrap(current, block, seed)
 
-    candidates = list(chain.from_iterable(field.groups))
+    candidates = field.candidates
     scans, p_values = _scanned(bootstrap, field, seen)
     least = thresholds(np.array([s.drawn for s in scans]), LEVEL)
     trials = [
