@@ -304,6 +304,59 @@ def test_samples_that_are_not_valid_are_no_stop():
     assert np.array_equal(in_motion(run), apart(4000, near, (2000, 2100)))
 
 
+def axis_with_encoder(count, rate=2000.0):
+    """The exact motion of an axis with 2 kg and dry friction: time, s, position, velocity, force.
+
+    `count`: of its encoder, m, which the position is rounded to.
+    """
+    time = np.arange(8 * int(rate)) / rate
+    speed = 0.3 * np.sin(9 * time) + 0.1 * np.sin(31 * time)
+    slope = 2.7 * np.cos(9 * time) + 3.1 * np.cos(31 * time)
+    place = -np.cos(9 * time) / 30 - np.cos(31 * time) / 310
+    return time, np.round(place / count) * count, speed, 2 * slope + np.sign(speed)
+
+
+DRY = {"inertia": 2.0, "coulomb+": 1.0, "coulomb-": 1.0, "viscous+": 0.0, "viscous-": 0.0}
+
+
+@pytest.mark.parametrize("samples", [1, 4])
+def test_a_velocity_of_encoder_differences_is_derived_anew_from_the_position(samples):
+    """Its noise is not white: by what white noise would be, it is taken for motion."""
+    time, position, _, force = axis_with_encoder(1e-6)
+    back = np.concatenate([np.full(samples, position[0]), position[:-samples]])
+    run = Recording(time, force, position, (position - back) / samples * 2000)
+    model = models.from_parameters(models.coulomb_viscous(), DRY)
+    bare = dataclasses.replace(run, velocity=None)
+    assert force_error(model, run) < 0.02
+    assert force_error(model, run) == pytest.approx(force_error(model, bare), rel=0.2)
+    # Friction has the recorded velocity, which says where the axis rests.
+    motion = Prepared(run)
+    assert np.std(motion.recording.velocity - motion.velocity) > 1e-4
+
+
+def test_a_velocity_of_its_own_sensor_is_kept_beside_a_coarse_position():
+    time, position, speed, force = axis_with_encoder(1e-3)
+    noise = 1e-4 * np.random.default_rng(0).standard_normal(len(time))
+    run = Recording(time, force, position, speed + noise)
+    motion = Prepared.of(run)
+    assert np.array_equal(motion.velocity, motion.recording.velocity)
+    assert len(motion.choices) == 1
+    model = models.from_parameters(models.coulomb_viscous(), DRY)
+    bare = dataclasses.replace(run, velocity=None)
+    assert force_error(model, run) < 0.5 * force_error(model, bare)
+
+
+def test_a_position_that_came_at_fewer_samples_tells_no_acceleration():
+    time, position, speed, force = axis_with_encoder(1e-9)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(time))
+    run = Recording(time, force, position, speed + noise)
+    assert len(Prepared.of(run).choices) == 2
+    assert len(Prepared.of(dataclasses.replace(run, position_every=4)).choices) == 1
+    gap = position.copy()
+    gap[100] = np.nan
+    assert len(Prepared.of(dataclasses.replace(run, position=gap)).choices) == 1
+
+
 def test_a_late_velocity_that_ends_in_motion_does_not_spoil_the_error():
     """Taken earlier, it is not known at the end, and its derivative not beside it."""
     time = np.arange(8000) / 2000

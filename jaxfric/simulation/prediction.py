@@ -30,9 +30,10 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     """The force that the recorded motion needs, N, shape `(N,)`.
 
     The model's columns, and the zero-phase smoothing derivative of its momentum, whose width is
-    chosen from the noise of the position (of the velocity where there is no position). Pure: may
-    stand inside `jax.jit`, `jax.vmap` and `jax.grad`. At v = 0, where friction takes any value up
-    to break-away, the value is that of the terms at rest. A
+    chosen from the noise of the velocity; or of the position, where that tells the acceleration
+    better, as beside a velocity that a drive has taken from its encoder. Pure: may stand inside
+    `jax.jit`, `jax.vmap` and `jax.grad`; there the recorded velocity is kept. At v = 0, where
+    friction takes any value up to break-away, the value is that of the terms at rest. A
     [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
     first order. What a load pushes that is stepped along the motion (`DryCompliance`,
     `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings. NaN where a
@@ -52,15 +53,23 @@ class Prepared:
         """The same, of one of few lengths, so that few programs serve all recordings; a long one,
         of which a copy counts, as it is.
         """
-        return cls(uniform(recording) if recording.num_samples <= MOST else recording)
+        short, every = recording.num_samples <= MOST, recording.position_every
+        return cls(uniform(recording) if short else recording, every=every)
 
-    def __init__(self, recording: Recording, whole: "Prepared | None" = None):
+    def __init__(
+        self, recording: Recording, whole: "Prepared | None" = None, every: int | None = None
+    ):
         self.recorded = recording  # whose noise is that of a late velocity, corrected, too
         self._whole = whole  # of which it is a part
         self._derived = recording.velocity is None
-        self._slope: signals.Choice | None = None  # by which the velocity was derived, outside jit
-        if self._derived and not signals.is_traced(recording):
-            self._slope = signals.choose(recording) if whole is None else whole._slope
+        # By which the momentum's velocity is derived from the position, outside jit.
+        self._slope: signals.Choice | None = None
+        if whole is not None:
+            self._slope = whole._slope
+        elif not signals.is_traced(recording) and (
+            self._derived or _better_told(recording, every or recording.position_every)
+        ):
+            self._slope = signals.choose(recording)
 
     @cached_property
     def recording(self) -> Recording:
@@ -68,6 +77,18 @@ class Prepared:
         if self._whole is not None and not self._derived:
             return self.recorded
         return signals.prepare(self.recorded, self._slope, self.step)
+
+    @cached_property
+    def velocity(self) -> Array | np.ndarray:
+        """The velocity that momentum is taken with, m/s, `(N,)`.
+
+        That of the position, where it tells the acceleration better. Friction has the recorded one,
+        which says where the axis rests.
+        """
+        if self._derived or self._slope is None:
+            return self.recording.velocity
+        bare = dataclasses.replace(self.recorded, velocity=None)
+        return signals.prepare(bare, self._slope, self.step).velocity
 
     @cached_property
     def step(self) -> float | None:
@@ -84,14 +105,14 @@ class Prepared:
         """
         if signals.is_traced(self.recording):
             return (None, None) if self._derived else (None,)
-        return (self._slope, self.choice) if self._derived else (self.choice,)
+        return (self.choice,) if self._slope is None else (self._slope, self.choice)
 
     @cached_property
     def choice(self) -> signals.Choice:
         """The local polynomial that differentiates momentum, outside jit.
 
-        That which is best for a recorded velocity; for a derived one the wider of those that are
-        best for the first and the second derivative of the position.
+        That which is best for a recorded velocity; for one of the position the wider of those that
+        are best for its first and its second derivative.
         """
         if self._whole is not None:
             return self._whole.choice
@@ -136,6 +157,23 @@ class Prepared:
         return dataclasses.replace(excerpt(self.recorded), velocity=np.concatenate(velocity))
 
 
+def _better_told(recording: Recording, every: int) -> bool:
+    """Whether the position tells the acceleration better than the recorded velocity does.
+
+    By the errors that the best local polynomial of each is expected to make. The noise of a
+    velocity that a drive has filtered is not white, and what is expected of it too little, if
+    anything. A position that is not known at every sample, but at one of so many, is none to derive
+    from.
+    """
+    position = recording.position
+    if position is None or every != 1:
+        return False
+    if not np.isfinite(np.asarray(position)[np.asarray(recording.mask)]).all():
+        return False
+    own = signals.choose(recording, recording.velocity).error
+    return signals.choose(recording, order=2).error < own
+
+
 def forces(
     model: Model, motion: Prepared
 ) -> Iterator[tuple[slice, Float[Array, " n"] | np.ndarray]]:
@@ -170,9 +208,10 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
         # speed: as much as the force has had.
         lagging = _by_kernel(prepared, model.only(_late).momentum(prepared))
         momentum = partial(_momentum_of, model.only(lambda term: not _late(term)))
-    moved = momentum(prepared)
+    driven = dataclasses.replace(prepared, velocity=motion.velocity)
+    moved = momentum(driven)
     if len(motion.choices) > 1 and any(map(_stepped, summands(model.term))):
-        moved = moved + _smoothing_of_loads(model, motion, prepared)
+        moved = moved + _smoothing_of_loads(model, motion, driven)
     rate = _rate(moved, prepared, motion.choices[-1], motion.step)
     return later(prepared, force(prepared) + rate + lagging, delay)
 
