@@ -1188,6 +1188,25 @@ def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     assert again.candidate_set is first.candidate_set
 
 
+@pytest.mark.parametrize("late", [0.0, 2e-4])
+def test_wider_kernels_stand_on_the_same_nodes(healthy, late):
+    """What is stepped from node to node, as a load in its gap, is the same through them."""
+    run = healthy[0]
+    force = np.interp(np.asarray(run.time) - late, run.time, run.force)
+    found = problem.problem_of(dataclasses.replace(run, force=force), models.named("gaussian"))
+    narrow, between, wide = found.evidence, found.between, found.wide
+    assert (between.half, wide.half) == (8, 12)
+    for other in (between, wide):
+        assert other.reach == pytest.approx(narrow.reach * other.half / narrow.half)
+        assert np.array_equal(other.motion.position, narrow.motion.position)
+        assert np.array_equal(other.motion.force, narrow.motion.force)
+        # Rows as far apart, by the kernel; of a straight force each is its value in the middle.
+        assert np.diff(other.centre).min() == other.half // 2
+        straight = 3.0 * np.asarray(other.motion.time)
+        assert other.project(straight) == pytest.approx(straight[other.centre], rel=1e-6)
+        assert other.project(0 * straight, straight) == pytest.approx(3.0, rel=1e-6)
+
+
 def test_a_model_that_asks_for_another_alignment_gets_it(healthy):
     motion = motion_of(healthy[0])
     first = problem.problem_of(motion, models.named("gaussian"))

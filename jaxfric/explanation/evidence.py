@@ -21,7 +21,7 @@ from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
 from .evaluation import BATCH, PAIR, evaluate, sizes
 from .motion import Motion, derived, motion_of
-from .nodes import NODES, STRIDE, averaged, node_signals, padded, windows
+from .nodes import NODES, averaged, node_signals, padded, stride, windows
 
 
 class Evidence(NamedTuple):
@@ -29,7 +29,8 @@ class Evidence(NamedTuple):
 
     - `motion`: recording of the nodes, padded to one of few lengths, `(M,)`.
     - `nodes`: how many of them are real.
-    - `average` and `slope`: weights of the nodes around every third one, 1 and 1/s, `(R, K)`;
+    - `average` and `slope`: weights of the nodes around every third one (farther apart beside a
+      wider kernel on the same nodes), 1 and 1/s, `(R, K)`;
       `rows`: which of these lie in slip, `(J,)`.
     - `force`: that of each row, N, `(J,)`; `target`: without what another simulator has computed,
       where the recording brings that; `side`: the direction, ±1.
@@ -54,6 +55,11 @@ class Evidence(NamedTuple):
     reach: float
     width: int
     clock: bool
+
+    @property
+    def half(self) -> int:
+        """Nodes in half a kernel."""
+        return self.average.shape[1] // 2
 
     @property
     def peak(self) -> float:
@@ -128,9 +134,10 @@ class Evidence(NamedTuple):
 
     def stretch(self, first: int, nodes: int) -> "tuple[Evidence, np.ndarray]":
         """The rows within so many nodes from one on, and which these are, `(J,)`."""
-        first -= first % STRIDE
+        step = stride(self.half)
+        first -= first % step
         chosen = slice(first, first + nodes)
-        windows = slice(first // STRIDE, (first + nodes - 2 * NODES - 1) // STRIDE + 1)
+        windows = slice(first // step, (first + nodes - 2 * self.half - 1) // step + 1)
         inside = (self.rows >= windows.start) & (self.rows < windows.stop)
         motion = jax.tree.map(lambda values: values[chosen], self.motion)
         rows = {name: getattr(self, name)[inside] for name in ("force", "target", "side")}
@@ -153,9 +160,9 @@ class Evidence(NamedTuple):
 
 
 def _weigh(values: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weighted sums of the nodes around every third one, at the numbers `rows`."""
+    """Weighted sums of the nodes around those that are a [`stride`][] apart, at numbers `rows`."""
     around = np.lib.stride_tricks.sliding_window_view(values, weights.shape[1], axis=-1)
-    centred = around[..., ::STRIDE, :][..., : len(weights), :]
+    centred = around[..., :: stride(weights.shape[1] // 2), :][..., : len(weights), :]
     return np.einsum("...ck,ck->...c", centred, weights)[..., rows]
 
 
@@ -169,15 +176,17 @@ def gather(
     delay: float = 0.0,
     reversals: bool = False,
     reach: float | None = None,
+    half: int = NODES,
 ) -> Evidence:
     """The evidence of one recording.
 
     **Arguments:** `recording`, signals of shape `(N,)`, or its motion, with which many rows take
-    little longer than one; `half_width` of the kernel in samples, by
-    default [`kernel_half_width`][jaxfric.signals.kernel_half_width], or as near as samples allow to
-    `reach`, s, that of another recording; `delay`, s, by which the
-    force is taken later; `reversals`: rows that reach across a reversal too, but none at rest,
-    for judging a model as [`relative_error`][jaxfric.simulation.errors.relative_error] does.
+    little longer than one; `half_width` of the kernel in samples, by default
+    [`kernel_half_width`][jaxfric.signals.kernel_half_width], or as near as samples allow to
+    `reach`, s, that of another recording; `delay`, s, by which the force is taken later;
+    `reversals`: rows that reach across a reversal too, but none at rest, for judging a model as
+    [`relative_error`][jaxfric.simulation.errors.relative_error] does; `half`: nodes in half a
+    kernel.
 
     **Raises:** `ValueError` if the axis hardly slips.
     """
@@ -187,12 +196,12 @@ def gather(
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
     # Of a position that comes seldom no two nodes lie between the same two updates.
-    width = max(int(half_width or _usual(prepared)), NODES * motion.recording.position_every)
+    width = max(int(half_width or _usual(prepared)), half * motion.recording.position_every)
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
-    step = _spacing(width)
-    span = float(step * NODES * limits.interval)
+    step = max(1, round(width / half))
+    span = float(step * half * limits.interval)
     parts = node_signals(prepared, limits, step, delay, motion.smoothed)
-    index, whole, average, slope = windows(parts, span)
+    index, whole, average, slope = windows(parts, span, half)
     rows = _moving(parts["velocity"][index], whole, average, limits.slowest, reversals)
     if prepared.position is not None:
         rows = _known_from(parts, index[rows, 0], rows, MEMORY * (limits.high - limits.low))
@@ -203,7 +212,7 @@ def gather(
             "structure from chance. Record longer, or move more."
         )
     nodes = padded(parts, prepared)
-    centre = index[rows, NODES]
+    centre = index[rows, half]
     force = np.sum(average * parts["force"][index], axis=1)[rows]
     target = _without_simulated(force, parts, index, rows, average, averaged(slope))
     pads = nodes.num_samples - len(parts["time"])
@@ -221,7 +230,7 @@ def gather(
         elapsed=np.pad(parts["elapsed"], (0, pads), mode="edge"),
         limits=limits,
         reach=span,
-        width=step * NODES,
+        width=step * half,
         clock=bool(np.all(np.diff(time) > 0)),
     )
 
@@ -229,11 +238,6 @@ def gather(
 def _usual(prepared: Recording) -> int:
     """The half-width of the kernel, in samples, that a prepared recording suggests."""
     return min(signals.kernel_half_width(prepared), _widest(prepared))
-
-
-def _spacing(width: int) -> int:
-    """Samples between two nodes."""
-    return max(1, round(width / NODES))
 
 
 # Nodes at most, some ten thousand rows: columns of all candidates at more would fill the memory,
@@ -246,7 +250,7 @@ def shortened(recording: Recording) -> Recording:
     if recording.num_samples <= SPARE * LONGEST:
         return recording
     motion = motion_of(excerpt(recording))
-    most = LONGEST * _spacing(_usual(motion.padded))
+    most = LONGEST * max(1, round(_usual(motion.padded) / NODES))
     return excerpt(recording, min(most, MOST))
 
 

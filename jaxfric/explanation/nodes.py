@@ -11,10 +11,16 @@ from ..terms.sample import Scales
 from .motion import padded_length
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
-# which is below 1e-4 of its peak.
+# which is below 1e-4 of its peak. A wider kernel on the same nodes has more of them.
 NODES = 6
-# Rows are half a kernel apart: neighbours share a fifth of their weight, and nothing is lost.
+# Rows are half a kernel apart, so many nodes: neighbours share a fifth of their weight, and nothing
+# is lost.
 STRIDE = 3
+
+
+def stride(half: int) -> int:
+    """Nodes from row to row of a kernel with so many nodes in its half."""
+    return STRIDE * half // NODES
 
 
 def node_signals(
@@ -75,13 +81,15 @@ def _later(time, force, run, delay):
     return shifted(time, force, run, delay)
 
 
-def windows(parts: dict, reach: float) -> tuple[np.ndarray, ...]:
-    """Nodes of the row around every third node, whether they lie in one run, and their weights."""
-    middle = np.arange(NODES, len(parts["time"]) - NODES, STRIDE)
-    index = middle[:, None] + np.arange(-NODES, NODES + 1)[None, :]
+def windows(parts: dict, reach: float, half: int = NODES) -> tuple[np.ndarray, ...]:
+    """Nodes of the rows, `half` of them on either side of every third one (of every sixth where
+    there are twelve), whether they lie in one run, and their weights.
+    """
+    middle = np.arange(half, len(parts["time"]) - half, stride(half))
+    index = middle[:, None] + np.arange(-half, half + 1)[None, :]
     whole = parts["run"][index[:, 0]] == parts["run"][index[:, -1]]
-    even = np.arange(-NODES, NODES + 1) * reach / NODES
-    offset = parts["time"][index] - parts["time"][index[:, NODES]][:, None]
+    even = np.arange(-half, half + 1) * reach / half
+    offset = parts["time"][index] - parts["time"][index[:, half]][:, None]
     offset = np.where(whole[:, None], offset, even[None, :])
     slope = signals.kernel_slope(offset / reach)
     average, slope = signals.kernel_weights(

@@ -9,7 +9,6 @@ from ..terms.base import summands
 from ..terms.effects import traits
 from .evaluation import evaluate, sizes
 from .evidence import Evidence
-from .nodes import NODES
 from .regression import Fit
 
 # The signals that a fit predicts at the nodes.
@@ -58,26 +57,23 @@ def _crossing(force: np.ndarray, command: np.ndarray) -> np.ndarray:
     return np.where(apart, np.finfo(float).tiny * np.sign(command), force)
 
 
-# Nodes apart by which the bend of a derivative is taken: half of what its kernel reaches.
-_BEND = NODES // 2
-
-
 def rate(evidence: Evidence, values: np.ndarray) -> np.ndarray:
     """Time derivative of a signal at the nodes, by the kernel of the rows, `(M,)`.
 
     What the kernel takes off it to second order is put back: of a force that swings within a few
     kernels that is some per cent, which a saturation would show several times.
     """
-    spacing = evidence.reach / NODES
-    tau = np.arange(-NODES, NODES + 1) / NODES
+    half = evidence.half
+    spacing, apart = evidence.reach / half, half // 2  # the bend is seen at half the kernel's reach
+    tau = np.arange(-half, half + 1) / half
     weight = kernel_slope(tau)
     weight = weight / np.sum(weight * tau * evidence.reach)
     out = np.convolve(values, weight[::-1], "same")
     cubed = np.sum(weight * (tau * evidence.reach) ** 3) / 6
-    bend = np.roll(out, -_BEND) - 2 * out + np.roll(out, _BEND)
-    out = out - cubed * bend / (_BEND * spacing) ** 2
+    bend = np.roll(out, -apart) - 2 * out + np.roll(out, apart)
+    out = out - cubed * bend / (apart * spacing) ** 2
     # Where the kernel reaches across an interruption, or beyond the ends: the near difference.
-    segment, reach = np.asarray(evidence.motion.segment), NODES + _BEND
+    segment, reach = np.asarray(evidence.motion.segment), half + apart
     whole = np.roll(segment, reach) == np.roll(segment, -reach)
     whole[:reach] = whole[-reach:] = False
     near = np.gradient(values, spacing)

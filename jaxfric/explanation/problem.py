@@ -162,7 +162,7 @@ def _taken_later(
     motion, evidence: Evidence, wide: Evidence | None, delay: float
 ) -> tuple[Evidence, Evidence | None]:
     there = gather(motion, evidence.width, delay)
-    return there, None if wide is None else gather(motion, wide.width, delay)
+    return there, None if wide is None else gather(motion, wide.width, delay, half=wide.half)
 
 
 def _later(
@@ -192,15 +192,17 @@ def _assembled(
 def _wider(
     recording: Motion, narrow: Evidence, delay=0.0, across=False, factor=2.0
 ) -> Evidence | None:
-    """The recording through a wider kernel; `None` if whole steps between the nodes allow none, or
-    too few rows would be left for a test of significance.
+    """The recording through a wider kernel on the same nodes, so that what is stepped from node to
+    node, as a load in its gap, is the same; `None` if too few rows would be left for a test of
+    significance.
     """
+    half = round(factor * narrow.half)
     try:
-        wide = gather(recording, round(factor * narrow.width), delay, across)
+        wide = gather(recording, half * narrow.width // narrow.half, delay, across, half=half)
         blocks(wide.elapsed[wide.centre], wide.reach)
     except ValueError:
         return None
-    return wide if wide.width > narrow.width else None
+    return wide
 
 
 def _lateness(kernels: list[Evidence], known: Fit) -> tuple[float, float]:
