@@ -33,19 +33,23 @@ def bounded(
     the dry friction that there is, `dry` @ alpha: friction does not drive.
 
     An axis that moved was held by no more friction than the largest force there was. Between
-    reversals a filter sees next to nothing of a narrow bump and would take any height for it. Of
-    one that it sees less than half of, the height is at most the dry friction: friction at rest is
-    up to twice that in slip.
+    reversals a filter sees next to nothing of a narrow bump and would take any height for it. But
+    friction at rest is up to twice that in slip, so also twice that at the slowest rows: of a bump
+    that is seen there with the part c of its height h, h + d ≤ 2 (c h + d) beside the dry friction
+    d, which of one that is seen by half is no limit.
     """
     alpha = _within(columns, target, bumps, peak)
     tied = np.zeros(len(alpha))
     if dry @ alpha <= 0:  # a force with the wrong sign is for others to tell
         return alpha
-    tails = bumps & (np.max(np.abs(columns), axis=0, initial=0.0) < 0.5)
+    unseen = 1 - 2 * np.max(np.abs(columns), axis=0, initial=0.0)
+    tails = bumps & (unseen > 0)
+    most = 1 / np.where(tails, unseen, 1.0)
 
     def beyond() -> np.ndarray:
-        most = dry @ alpha
-        over = np.where(bumps & (alpha < -most), -1.0, np.where(tails & (alpha > most), 1.0, 0.0))
+        there = dry @ alpha
+        high = np.where(tails & (alpha > most * there), most, 0.0)
+        over = np.where(bumps & (alpha < -there), -1.0, high)
         return np.where(tied == 0, over, 0.0)
 
     while (more := beyond()).any():
