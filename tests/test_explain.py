@@ -50,6 +50,7 @@ from jaxfric.explanation import (
     verification,
     wording,
 )
+from jaxfric.explanation.figures import Figures
 from jaxfric.explanation.finding import Finding
 from jaxfric.explanation.inputs import interpolated
 from jaxfric.explanation.motion import motion_of
@@ -1431,6 +1432,13 @@ def test_a_command_that_does_not_arrive_is_a_limit_of_the_force(healthy, capsys)
         bound = sanity.bounded(motion, problem.problem_of(motion, models.named("gaussian")), None)
         assert float(bound.limit.value) == pytest.approx(limit, rel=0.01)
         assert bound.share > 0.95
+        # At the samples, too; but not where most of what is left there is something else.
+        waves = 60 * np.sin(8 * np.asarray(motion.recording.time))
+        for other, there in ((0.0, True), (waves, False)):
+            run = limited(0, limit)
+            run = dataclasses.replace(run, force=run.force + other)
+            cut = Figures(sanity.arrived(run, bound.limit), None, True)
+            assert sanity.by_samples(bound, Figures(run, None, True), cut, 0.02) == there
     stopped = planted(healthy[0], terms.EndStop(), (6e4,), (0.05,))
     for run in (*healthy, stopped, planted(healthy[0], terms.Cogging(), (9.0, 6.0), (0.01,))):
         posed = problem.problem_of(run, models.named("gaussian"))
@@ -1777,7 +1785,7 @@ def test_a_bump_that_rows_hardly_show_does_not_drive(height):
     ("seen", "expected"), [(0.02, 5.2), (0.1, 6.25), (0.2, 7.5), (0.4, 7.5), (0.8, 7.5)]
 )
 def test_friction_at_rest_is_up_to_twice_that_in_the_slowest_row(seen, expected):
-    """h + d ≤ 2 (c h + d): that bounds what is extrapolated, and nothing that was seen."""
+    """H + d ≤ 2 (c h + d): that bounds what is extrapolated, and nothing that was seen."""
     rng = np.random.default_rng(1)
     side = np.sign(rng.normal(size=400))
     flank = side * np.linspace(0.0, seen, 400)

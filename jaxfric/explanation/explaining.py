@@ -105,10 +105,12 @@ def _explain(
     bound = None
     if inputs.checked is None and not inputs.arrived:
         bound = sanity.bounded(motion, problem, known.model, held)
-    if bound is not None:
+    cut_off = None if bound is None else inputs.cut_off(bound.limit)
+    reach = problem.evidence.reach
+    if cut_off and sanity.by_samples(bound, inputs.figures, cut_off.figures, reach):
         for candidates in problem.candidate_sets:
             candidates.close()
-        found = _explain(inputs.cut_off(bound.limit), simulate, seed, doing)
+        found = _explain(cut_off, simulate, seed, doing)
         return sanity.with_limit(found, bound, inputs.figures)
     if held is not None:
         with_holdout(problem, held)  # says what is wrong with it before anything takes time

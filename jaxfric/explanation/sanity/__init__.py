@@ -1,6 +1,10 @@
 """Sanity before physics: what a log and a simulator differ in that no missing physics is."""
 
-from .bounded import bounded as bounded, with_limit as with_limit
+from .bounded import (
+    bounded as bounded,
+    by_samples as by_samples,
+    with_limit as with_limit,
+)
 from .checked import (
     CheckedSimulator as CheckedSimulator,
     Part as Part,

@@ -46,13 +46,14 @@ NEAR = tuple(np.linspace(0.99, 1.05, 13))
 
 
 class Bounded(NamedTuple):
-    """A limit of force, N; the part of the mean-square residual that goes with it; and the baseline
-    of the log as it is, with what it leaves of the force through the kernel, on the held-out
-    recording too.
+    """A limit of force, N; the part of the mean-square residual that goes with it; the baseline
+    beside what arrives; and that of the log as it is, with what it leaves of the force through the
+    kernel, on the held-out recording too.
     """
 
     limit: Estimate
     share: float
+    beside: Model
     baseline: Model
     filtered: float
     filtered_held: float | None
@@ -96,11 +97,24 @@ def bounded(
     if not current.energy < limits.LEAVES_IN_ALL * base.energy:
         return None
     first = base if given is None else at_values(given, rows)
-    baseline = spelled.model(first, motion.recording.units, problem.delay)
+    beside, baseline = (
+        spelled.model(each, motion.recording.units, problem.delay) for each in (current, first)
+    )
     share = 1 - current.energy / base.energy
     there = None if held is None else with_holdout(problem, held).held
     filtered = [None if each is None else verification.error(first, each) for each in (rows, there)]
-    return Bounded(limit, share, baseline, *filtered)
+    return Bounded(limit, share, beside, baseline, *filtered)
+
+
+def by_samples(bound: Bounded, commanded: Figures, arrived: Figures, reach: float) -> bool:
+    """Whether the limit halves what noise does not make of the error by samples as well, in power.
+
+    Rows hold what slips for a kernel. An axis that creeps against a hard stop does not give way at
+    one force: at the samples beside it another force stops it each time. `reach` of the kernel, s.
+    """
+    noise = arrived.floor(bound.beside, 2 * reach) ** 2
+    before = commanded.here(bound.baseline) ** 2 - noise
+    return arrived.here(bound.beside) ** 2 - noise < limits.LEAVES_IN_ALL * before
 
 
 def _one_level(size: np.ndarray, needed: np.ndarray, level: float) -> bool:
