@@ -1201,6 +1201,9 @@ def test_wider_kernels_stand_on_the_same_nodes(healthy, late):
         assert other.reach == pytest.approx(narrow.reach * other.half / narrow.half)
         assert np.array_equal(other.motion.position, narrow.motion.position)
         assert np.array_equal(other.motion.force, narrow.motion.force)
+        # A wave of two nodes is seen as fast as it is: the wider kernel averages it away.
+        wave = np.tile([1.0, -1.0], other.motion.num_samples // 2)
+        assert np.abs(other.project(wave)).max() < 1e-3
         # Rows as far apart, by the kernel; of a straight force each is its value in the middle.
         assert np.diff(other.centre).min() == other.half // 2
         straight = 3.0 * np.asarray(other.motion.time)
@@ -1458,6 +1461,26 @@ def test_beside_a_limit_of_the_force_all_else_is_said_of_what_arrived():
     assert force_error(found.model, run) == pytest.approx(found.fit["force_error"]["after"])
     held_error = force_error(found.model, held)
     assert held_error == pytest.approx(found.fit["holdout_force_error"]["after"])
+
+
+def test_a_quarter_of_the_blocks_is_predicted_by_the_others_fitted_again(healthy):
+    """Of a law that is straight in its parameters as left out to first order; and of noise, worse
+    than without it.
+    """
+    posed = problem.problem_of(healthy[0], models.named("coulomb-viscous"))
+    seen, block = posed.evidence, posed.block
+    spring = regression.fit([posed.structure, terms.Spring()], seen)
+    again, linear = (
+        intervals.left_out_again(spring, seen, block),
+        intervals.left_out(spring, 1, block),
+    )
+    assert spring.energy < again == pytest.approx(linear, rel=0.05)
+    place = np.asarray(seen.motion.position)[seen.centre]
+    planted = seen._replace(target=seen.target + 50 * (place - place.mean()))
+    found = regression.fit([posed.structure, terms.Spring()], planted)
+    assert intervals.left_out_again(found, planted, block) == pytest.approx(again, rel=0.05)
+    less = regression.fit([posed.structure], planted)
+    assert less.energy > 1.5 * again
 
 
 def test_a_law_of_several_parameters_is_refined_from_all_optima_of_its_grid():

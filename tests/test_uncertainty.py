@@ -10,12 +10,8 @@ import pytest
 
 import jaxfric as jf
 from jaxfric.explanation import intervals, parameters
-from jaxfric.explanation.regression import Fit
 from jaxfric.identification import uncertainty
 from jaxfric.identification.identified import result_names
-from jaxfric.terms import Coulomb, Sum
-from jaxfric.terms.effects.cogging import Cogging
-from jaxfric.terms.effects.presliding import Dahl
 
 
 def trajectory(rng, seconds, rate):
@@ -220,36 +216,6 @@ def test_degrees_of_freedom_follow_the_blocks_that_tell():
     one, eight, all_ = intervals.spread(fit, block).degrees_of_freedom(np.eye(3))
     # What one block holds is judged by the noise of all.
     assert 18 < one < 26 and 5 < eight < 8 and 18 < all_ < 24
-
-
-@pytest.mark.parametrize("cycles", [0.05, 0.1, 0.12, 0.15, 0.3])
-def test_what_a_kernel_of_twice_the_width_shows_falsely(cycles):
-    """By the kernel itself, on a wave of so many cycles a row: less than half of its power passes,
-    and the rows have more.
-    """
-    half = 200
-    offsets = np.arange(-2 * half, 2 * half + 1)
-
-    def passed(width):
-        kernel = np.maximum(1 - (offsets / width) ** 2, 0.0) ** 4
-        return np.sum(kernel * np.cos(2 * np.pi * cycles * offsets / (half / 2))) / kernel.sum()
-
-    share = passed(2 * half) / passed(half)
-    rows = np.concatenate([np.arange(100), 150 + np.arange(100)])
-    wave = np.sin(2 * np.pi * cycles * rows + 0.3)
-    terms = Sum((Cogging(), Coulomb())), Dahl()  # a wave of the baseline is one
-
-    def fit(size):
-        columns = np.stack([size * wave, size * wave, np.ones_like(wave), size * wave], axis=1)
-        slopes = size * wave[:, None] * [1.0, 1.0]
-        betas, alphas = (np.zeros(1), np.zeros(1)), (np.zeros(3), np.zeros(1))
-        return Fit(terms, betas, alphas, columns, slopes, wave, 1.0)
-
-    assert not intervals.aliased(fit(1.0), rows, fit(share)).any()
-    found = intervals.aliased(fit(1.0), rows, fit(0.9))
-    fast = share**2 < 0.5
-    # The wave's own size, phase and pitch; neither what is steady nor what reversals hold.
-    assert found.tolist() == [fast, fast, False, False, fast, False]
 
 
 def test_a_force_of_few_blocks_is_told_with_its_own_degrees_and_tested_with_those_of_all():

@@ -132,6 +132,11 @@ class Evidence(NamedTuple):
         first = np.asarray(plain)[0]
         return first, np.zeros_like(first) if momentum is None else np.asarray(momentum)[0]
 
+    def only(self, kept: np.ndarray) -> "Evidence":
+        """Some of the rows, `(J,)` booleans."""
+        names = ("rows", "force", "target", "side", "centre")
+        return self._replace(**{name: getattr(self, name)[kept] for name in names})
+
     def stretch(self, first: int, nodes: int) -> "tuple[Evidence, np.ndarray]":
         """The rows within so many nodes from one on, and which these are, `(J,)`."""
         step = stride(self.half)

@@ -3,12 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
 from ..identification.uncertainty import student_quantile
-from ..terms.base import summands
+from .evidence import Evidence
 from .least_squares import orthonormal
-from .regression import Fit
+from .regression import Fit, fit
 
 # Of a variance that one or two blocks tell, the spread over the other blocks tells something too.
 LEAST_DEGREES = 2.0
@@ -101,36 +101,27 @@ def spread(current: Fit, block: np.ndarray) -> Spread:
     return Spread(matrix, back, grams, freed, pooled)
 
 
-# A kernel of twice the half-width h smooths the rows by a Gaussian more, of variance 3 h²/11, about
-# that of one row. It halves the power of a wave of 0.13 cycles a row, of which neighbouring rows
-# differ by this part of its mean square.
-DIFFERS = 0.6
-HALF_POWER = 0.5
+# Each leaves out every fourth block, so that all parts of the motion stay in the others.
+FOLDS = 4
 
 
-def aliased(current: Fit, rows: Int[np.ndarray, " J"], wide: Fit) -> Bool[np.ndarray, " P"]:
-    """Of which parameters a kernel of twice the width shows the derivative falsely, `(P,)`.
+def left_out_again(current: Fit, evidence: Evidence, block: np.ndarray) -> float:
+    """The energy of the residual, N², each quarter of the blocks by the other three, fitted again.
 
-    Neighbouring rows differ so much that less than half of the power should pass there, and more
-    does: the nodes of that kernel are about a cycle apart, so that a fast wave looks slow. Asked of
-    waves alone: what a few reversals hold passes as its rows happen to lie, and truly.
-
-    **Arguments:** `rows`, the number of each row of the fit, consecutive in a slip stretch, `(J,)`;
-    `wide`, the same terms on the rows of that kernel.
+    When a load strikes its flank is nothing that a small change of its parameters changes a little:
+    beside one block more of them the linear [`left_out`][] had it anywhere.
     """
-    neighbours = np.flatnonzero(np.diff(rows) == 1)
-    one, two = current.jacobian[neighbours], current.jacobian[neighbours + 1]
-    fast = np.sum((two - one) ** 2, axis=0) > DIFFERS * np.sum((one**2 + two**2) / 2, axis=0)
-    narrow, passed = (np.mean(each.jacobian**2, axis=0) for each in (current, wide))
-    return _of_waves(current) & fast & (passed > HALF_POWER * narrow)
-
-
-def _of_waves(current: Fit) -> Bool[np.ndarray, " P"]:
-    """Which parameters are those of waves, in the baseline's sum too, `(P,)`."""
-    parts = [part for term in current.terms for part in summands(term)]
-    waves = [any(each.repeats for each in part.nonlinear) for part in parts]
-    kinds = ([len(p.affine) for p in parts], [len(p.nonlinear) for p in parts])
-    return np.concatenate([np.repeat(waves, counts) for counts in kinds])
+    power = 0.0
+    for fold in range(FOLDS):
+        out = block % FOLDS == fold
+        other = fit(current.terms, evidence.only(~out), current.betas, 4)
+        columns = [
+            evidence.columns(term, beta[None])[0]
+            for term, beta in zip(other.terms, other.betas, strict=True)
+        ]
+        rest = evidence.target - np.concatenate(columns, axis=1) @ np.concatenate(other.alphas)
+        power += float(np.sum(rest[out] ** 2))
+    return power
 
 
 def left_out(current: Fit, number: int, block: np.ndarray) -> float:
@@ -138,7 +129,7 @@ def left_out(current: Fit, number: int, block: np.ndarray) -> float:
 
     To first order in the term's own parameters, (I − H_b)⁻¹ r_b (Allen 1974's PRESS, by blocks);
     those of the other terms stay as all blocks say. Each block's pull on the fit is bounded as in
-    [`spread`][].
+    [`spread`][]. Of a law that is far from straight in its parameters [`left_out_again`][] says it.
 
     **Arguments:** `number` of the term; `block`, the number of each row's block, `(J,)`.
     """

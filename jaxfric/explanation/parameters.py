@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool
 
 from .. import programs
 from ..identification.uncertainty import Estimate
@@ -32,19 +31,9 @@ def model(current: Fit, units, taken_later: float = 0.0) -> Model:
     return known.with_force_delay(-taken_later) if taken_later else known
 
 
-def estimates(
-    current: Fit,
-    block: np.ndarray,
-    units: dict[str, str],
-    unseen: Bool[np.ndarray, " P"] | None = None,
-) -> list[dict[str, Estimate]]:
-    """The parameters of each term of a fit, waves by amplitude and phase too.
-
-    `unseen`: parameters of which these rows are not to say anything.
-    """
+def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
+    """The parameters of each term of a fit, waves by amplitude and phase too."""
     known = spread(current, block)
-    if unseen is not None:
-        known.covariance[unseen] = known.covariance[:, unseen] = np.inf
     matrix, freedom = known.covariance, known.degrees_of_freedom(np.eye(len(known.covariance)))
     result = []
     for n, term in enumerate(current.terms):
@@ -123,7 +112,7 @@ def with_smoothing(ours: dict[str, Estimate], wide: dict[str, Estimate]) -> dict
 
     Smoothing grows with the width; what the encoder's noise does to a column, and the rows beside
     a reversal, go the other way. What a kernel of twice the width, `wide`, changes beyond its own
-    noise is an error of the method, to be counted as it is (Barlow 2002). What it shows falsely
+    noise is an error of the method, to be counted as it is (Barlow 2002). What it does not show
     (parameters with no finite error there) it says nothing about.
     """
     return _widened(ours, wide, lambda own, there, apart: apart**2 - there**2)

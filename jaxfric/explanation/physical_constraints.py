@@ -11,7 +11,6 @@ from . import parameters as spelled
 from .burdens import IDEALISED, Machine, machine
 from .contest import Contest, Finalist
 from .evidence import Evidence
-from .intervals import aliased
 from .predictions import with_predictions
 from .regression import Fit, at_shapes, fit
 from .significance import blocks, evenly
@@ -96,9 +95,7 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
     if wide is not None:
         rows = evenly(len(wide.rows), int(block[-1]) + 1)
         again = fit(current.terms, with_predictions(wide, current), current.betas, 0)
-        there_shaped = at_shapes(again)
-        false = aliased(shaped, evidence.rows, there_shaped)
-        there = spelled.estimates(there_shaped, rows, units, false)
+        there = spelled.estimates(at_shapes(again), rows, units)
     for number in reversed(range(start, len(current.terms))):
         term = current.terms[number]
         gone = [spelled.tested(free[number][name]).interval() for name in traits(term).vanishes]

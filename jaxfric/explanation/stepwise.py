@@ -9,7 +9,7 @@ from ..terms.effect import Effect
 from .acceptance import LEAST_SHARE, accepted, needed
 from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence
-from .intervals import left_out
+from .intervals import left_out, left_out_again
 from .physical_constraints import constrained, nil
 from .predictions import with_predictions
 from .problem import Problem
@@ -197,7 +197,9 @@ def _pruned(
         less = without(current, evidence, index)
         gain, trial = 1 - current.energy / less.energy, selected[index - start].trial
         idle = trial.score(gain, size) <= 0 or gain < LEAST_SHARE
-        if not trial.effect.momentary:
+        if current.terms[index].stepped:
+            idle |= left_out_again(current, evidence, block) >= less.energy
+        elif not trial.effect.momentary:
             idle |= left_out(current, index, block) >= less.energy
         if idle:
             current, evidence = _predicting(less, evidence)

@@ -12,7 +12,6 @@ from . import parameters as spelled, verification
 from .baseline import refitted
 from .evidence import Evidence
 from .findings import Findings
-from .intervals import aliased
 from .regression import Fit, at_shapes, freed
 from .significance import evenly
 
@@ -78,8 +77,7 @@ def by_rows(
     wide: list[dict[str, Estimate]] = []
     if problem.wide is not None:
         current, block = again(problem.wide, others.last)
-        false = aliased(asked(others.last), problem.evidence.rows, current)
-        wide = spelled.estimates(current, block, units, false)
+        wide = spelled.estimates(current, block, units)
     there: dict[int, dict[str, Estimate]] = {}
     if problem.held is not None:
         # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.

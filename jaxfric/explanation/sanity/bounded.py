@@ -139,10 +139,7 @@ def _below(evidence: Evidence, level: float) -> Evidence:
     size = np.abs(np.asarray(evidence.motion.force, float))
     around = np.lib.stride_tricks.sliding_window_view(np.pad(size, NODES), 2 * NODES + 1)
     keep = around.max(axis=1)[evidence.centre] <= level
-    return evidence._replace(
-        rows=evidence.rows[keep], force=evidence.force[keep], target=evidence.target[keep],
-        side=evidence.side[keep], centre=evidence.centre[keep],
-    )  # fmt: skip
+    return evidence.only(keep)
 
 
 def _needed(evidence: Evidence, current: Fit) -> np.ndarray:
