@@ -1761,6 +1761,9 @@ def test_what_stays_beside_findings_is_judged_by_the_noise_of_neighbouring_rows(
     assert rough(0.046, "spring") and rough(0.033, "spring", floor=0.01)
     assert not rough(0.03, "spring", floor=0.01) and not rough(0.033, floor=0.01)
     assert not rough(0.06, "spring", floor=0.05)
+    # Beside a finding a tenth of the mismatch may remain, however little noise there is.
+    assert not rough(0.009, "spring", floor=1e-5) and rough(0.011, "spring", floor=1e-5)
+    assert rough(0.009, floor=1e-5) and rough(0.009, "spring", floor=1e-5, held=0.011)
     # Nothing within a sensor's linearity, 0.2 %.
     assert not rough(0.0019, "spring", before=0.002, floor=1e-4)
     # The held-out recording has to be explained as well, but for what belongs to a moment.

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..data.recording import Recording
 from . import parameters as spelled, verification
+from .acceptance import LINEARITY
 from .baseline import Baseline
 from .evidence import Evidence
 from .findings import Solution
@@ -47,7 +48,7 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
         current = fit(lasting.terms, evidence, lasting.betas)
     force = float(np.sqrt(np.mean(evidence.force**2)))
     seen = with_predictions(problem.evidence, current)
-    found = significant(locate(seen, current, seed), LEAST_SHARE, force)
+    found = significant(locate(seen, current, seed), LEAST_SHARE, LINEARITY * force)
     own = verification.error(current, problem.evidence)
     errors = {
         "force_error": {"before": own, "after": own},

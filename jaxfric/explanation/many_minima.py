@@ -130,9 +130,9 @@ def among_many(
     def less(one: Fit) -> tuple[bool, float]:
         return not within(one), one.energy
 
-    near = of_all(min(refined(best_of(starts, NEAR)), key=less))
+    near = min(refined(best_of(starts, NEAR)), key=less)
     if noise(current) > (1 - BEYOND_CHANCE) * current.energy:
-        return near  # of noise nothing can be removed
+        return of_all(near)  # of noise nothing can be removed
     kept = field.kept_betas
     here = candidate.form, *map(jax.tree.structure, current.terms)
     best, rounds = kept.get(here), range(ROUNDS - 1, ROUNDS)
@@ -153,10 +153,10 @@ def among_many(
         better = less(again) < less(found)
         found, part = (again, part) if better else (found, part / 2)
     kept[here] = np.concatenate([found.betas[0][None], best])[:BEST]
+    if less(near) <= less(found):
+        return of_all(near)
     found = of_all(found)
-    if found.energy > (1 - BEYOND_CHANCE) * current.energy:
-        return near
-    return min((found, near), key=less)
+    return found if found.energy <= (1 - BEYOND_CHANCE) * current.energy else of_all(near)
 
 
 def _along(found: Fit, count: int, part: float) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..terms.effects import EFFECTS
 from . import threads
-from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY
+from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY, OF_BASE
 from .bins import unit
 from .evidence import Evidence
 from .finding import Finding
@@ -26,28 +26,30 @@ def before_and_after(
     """Where the baseline's residual has structure, and where that of the findings has."""
     problem = better.findings.problem
     undelayed, selection = better.findings.undelayed
-    fits = [(better.first, problem, LEAST_SHARE)]
+    force = float(np.sqrt(np.mean(problem.evidence.force**2)))
+    fits = [(better.first, problem, LEAST_SHARE, LINEARITY * force)]
     if better.findings.selection.selected or wrong is not None:
-        fits.append((selection.last, undelayed, LATER_SHARE))
-    before, *after = threads.each(lambda one: _shown(*one[:2], problem, one[2], seed), fits)
+        mismatch = float(np.sqrt(better.first.energy / len(better.first.residual)))
+        remainder = OF_BASE**0.5 * mismatch  # of laws that have not quite the shape of their effect
+        fits.append((selection.last, undelayed, LATER_SHARE, max(LINEARITY * force, remainder)))
+    before, *after = threads.each(lambda one: _shown(*one, seed), fits)
     return before, after[0] if after else []
 
 
-def _shown(
-    current: Fit, problem: Problem, recorded: Problem, least: float, seed: int
-) -> list[Structure]:
-    """The structure of a fit's residual that a wider kernel and the held-out recording show too."""
-    force = float(np.sqrt(np.mean(recorded.evidence.force**2)))
+def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int) -> list[Structure]:
+    """The structure of a fit's residual that a wider kernel and the held-out recording show too.
+
+    From so large a `share` of what is left, and of that `size`, N.
+    """
     located = locate(with_predictions(problem.evidence, current), current, seed)
-    found = significant(located, least, force)
+    found = significant(located, share, size)
     found = through_wide(found, current, problem.wide, seed)
     return lasting(found, current, problem)
 
 
-def significant(found: list[Structure], least: float, force: float) -> list[Structure]:
-    """The structure that counts: by p-value, by share, and beyond the force sensor's linearity."""
-    floor = LINEARITY * force
-    return [s for s in found if s.p_value <= LEVEL and s.share >= least and s.size >= floor]
+def significant(found: list[Structure], share: float, size: float) -> list[Structure]:
+    """The structure that counts: by p-value, by its share of what is left, and by its size, N."""
+    return [s for s in found if s.p_value <= LEVEL and s.share >= share and s.size >= size]
 
 
 def through_wide(

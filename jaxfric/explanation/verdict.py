@@ -7,7 +7,7 @@ import numpy as np
 
 from ..checks import LEFT, Remark
 from ..terms.effects import EFFECTS
-from .acceptance import LINEARITY
+from .acceptance import LINEARITY, OF_BASE
 from .contest import Contest
 from .doubts import NOT_BETTER
 from .finding import Finding
@@ -30,12 +30,16 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     The findings (`shares` by effect) must explain the held-out recording as well: to within four
     times the noise, and its larger part. Effects of time alone need not recur: held-out error is
     allowed in proportion to what they explain here. Without findings a base that has to extrapolate
-    may miss that recording by more.
+    may miss that recording by more. No law has quite the shape of its effect: beside findings a
+    tenth of the mismatch may remain.
     """
     here, held = fit["force_error"], fit["holdout_force_error"]
 
+    def least(pair) -> float:
+        return max(LINEARITY, OF_BASE**0.5 * pair["before"] if shares else 0.0)
+
     def above(pair, size: float) -> bool:
-        return pair["after"] > max(size * fit["noise_floor"], LINEARITY)
+        return pair["after"] > max(size * fit["noise_floor"], least(pair))
 
     def remaining(pair) -> float:
         return (pair["after"] / max(pair["before"], 1e-300)) ** 2
@@ -50,7 +54,7 @@ def rough(fit: dict[str, Any], shares: Mapping[str, float]) -> bool:
     # The findings go from the mismatch to the noise, and less than half the way (in decades).
     halfway = np.sqrt(here["before"] * fit["noise_floor"])
     many = any(remaining(pair) > HALF**2 and above(pair, HALF_ROUGH) for pair in much)
-    many |= here["after"] > max(halfway, LINEARITY)
+    many |= here["after"] > max(halfway, least(here))
     return bool(above(here, ROUGH) or (shares and (many or far)))
 
 
