@@ -59,7 +59,7 @@ class _Stretch(NamedTuple):
         betas = coarse(term, betas)
         if not np.isfinite(most).all():
             return gains(term, self.seen, betas, self.basis)
-        own = self.seen.columns(term, betas)[:, :, 0]
+        own = np.nan_to_num(self.seen.columns(term, betas)[:, :, 0], posinf=0.0, neginf=0.0)
         own = own - (own @ self.basis) @ self.basis.T
         along, square = own @ self.left, np.einsum("gj,gj->g", own, own)
         size = np.clip(along / np.where(square > 0, square, 1.0), 0.0, most)

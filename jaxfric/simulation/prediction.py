@@ -157,13 +157,17 @@ class Prepared:
         return dataclasses.replace(excerpt(self.recorded), velocity=np.concatenate(velocity))
 
 
+# The position is taken where its acceleration is expected to err by a tenth: the noise of counts,
+# and of a velocity that a drive has filtered, is not white, so that either estimate may be three
+# times off. With a fifth, the width for a servo's counts took away its ripple at speed.
+BETTER = 0.1
+
+
 def _better_told(recording: Recording, every: int) -> bool:
     """Whether the position tells the acceleration better than the recorded velocity does.
 
-    By the errors that the best local polynomial of each is expected to make. The noise of a
-    velocity that a drive has filtered is not white, and what is expected of it too little, if
-    anything. A position that is not known at every sample, but at one of so many, is none to derive
-    from.
+    By the errors that the best local polynomial of each is expected to make. A position that is not
+    known at every sample, but at one of so many, is none to derive from.
     """
     position = recording.position
     if position is None or every != 1:
@@ -171,7 +175,7 @@ def _better_told(recording: Recording, every: int) -> bool:
     if not np.isfinite(np.asarray(position)[np.asarray(recording.mask)]).all():
         return False
     own = signals.choose(recording, recording.velocity).error
-    return signals.choose(recording, order=2).error < own
+    return signals.choose(recording, order=2).error < BETTER * own
 
 
 def forces(
