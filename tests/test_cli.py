@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from argparse import ArgumentTypeError
@@ -376,6 +377,19 @@ def test_demo_from_the_core_dependencies_alone(tmp_path):
     assert plain["after"] < 0.7 * plain["before"]
     assert (folder / "axis.csv").exists() and (folder / "model.json").exists()
     assert not (folder / "friction.png").exists()
+    # The README shows what it says; on another processor a last digit may differ.
+    shown, number = readme_text_of_demo(), r"\d+\.\d+"
+    for part in shown.split("\n\n"):
+        pattern = f"({number})".join(map(re.escape, re.split(number, part)))
+        found = re.search(pattern, done.stdout)
+        assert found, part
+        said = [float(each) for each in re.findall(number, part)]
+        assert [float(each) for each in found.groups()] == pytest.approx(said, rel=0.05)
+
+
+def readme_text_of_demo():
+    text = (ROOT / "README.md").read_text("utf-8")
+    return re.search(r"```text\n(What does this model.*?)\n```", text, re.DOTALL)[1]
 
 
 def test_explain_writes_what_it_says(tmp_path, capsys):
