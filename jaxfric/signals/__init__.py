@@ -1,6 +1,6 @@
 """Velocity without phase lag, noise, magnitudes, and what counts as slip."""
 
-from .choosing import choose as choose
+from .choosing import choose as choose, of_acceleration as of_acceleration
 from .clock import (
     GAP_FACTOR as GAP_FACTOR,
     continuous as continuous,

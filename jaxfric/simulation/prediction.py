@@ -62,14 +62,14 @@ class Prepared:
         self.recorded = recording  # whose noise is that of a late velocity, corrected, too
         self._whole = whole  # of which it is a part
         self._derived = recording.velocity is None
-        # By which the momentum's velocity is derived from the position, outside jit.
-        self._slope: signals.Choice | None = None
+        # By which the acceleration is taken, outside jit.
+        self._chosen: tuple[signals.Choice, ...] = ()
         if whole is not None:
-            self._slope = whole._slope
-        elif not signals.is_traced(recording) and (
-            self._derived or _better_told(recording, every or recording.position_every)
-        ):
-            self._slope = signals.choose(recording)
+            self._chosen = whole._chosen
+        elif not signals.is_traced(recording):
+            self._chosen = signals.of_acceleration(recording, every or recording.position_every)
+        # By which the momentum's velocity is derived from the position.
+        self._slope = self._chosen[0] if len(self._chosen) > 1 else None
 
     @cached_property
     def recording(self) -> Recording:
@@ -98,28 +98,17 @@ class Prepared:
         traced = signals.is_traced(self.recorded)
         return None if traced else signals.host_interval(self.recorded)
 
-    @cached_property
+    @property
     def choices(self) -> tuple[signals.Choice | None, ...]:
         """The local polynomials by which the acceleration is taken, one after the other; `None` for
         parabolas, inside jit.
         """
-        if signals.is_traced(self.recording):
-            return (None, None) if self._derived else (None,)
-        return (self.choice,) if self._slope is None else (self._slope, self.choice)
+        return self._chosen or ((None, None) if self._derived else (None,))
 
-    @cached_property
+    @property
     def choice(self) -> signals.Choice:
-        """The local polynomial that differentiates momentum, outside jit.
-
-        That which is best for a recorded velocity; for one of the position the wider of those that
-        are best for its first and its second derivative.
-        """
-        if self._whole is not None:
-            return self._whole.choice
-        if self._slope is None:
-            return signals.choose(self.recorded, self.recorded.velocity)
-        both = self._slope, signals.choose(self.recorded, order=2)
-        return max(both, key=lambda each: each.half_width)
+        """The local polynomial that differentiates momentum, outside jit."""
+        return self._chosen[-1]
 
     @property
     def _reach(self) -> int:
@@ -155,27 +144,6 @@ class Prepared:
         parts = [self.around(own) for own in pieces(np.asarray(self.recorded.mask))]
         velocity = [np.asarray(part.recording.velocity)[own] for part, own in parts]
         return dataclasses.replace(excerpt(self.recorded), velocity=np.concatenate(velocity))
-
-
-# The position is taken where its acceleration is expected to err by a tenth: the noise of counts,
-# and of a velocity that a drive has filtered, is not white, so that either estimate may be three
-# times off. With a fifth, the width for a servo's counts took away its ripple at speed.
-BETTER = 0.1
-
-
-def _better_told(recording: Recording, every: int) -> bool:
-    """Whether the position tells the acceleration better than the recorded velocity does.
-
-    By the errors that the best local polynomial of each is expected to make. A position that is not
-    known at every sample, but at one of so many, is none to derive from.
-    """
-    position = recording.position
-    if position is None or every != 1:
-        return False
-    if not np.isfinite(np.asarray(position)[np.asarray(recording.mask)]).all():
-        return False
-    own = signals.choose(recording, recording.velocity).error
-    return signals.choose(recording, order=2).error < BETTER * own
 
 
 def forces(
