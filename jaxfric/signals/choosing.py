@@ -37,14 +37,15 @@ BETTER = 0.1
 class _Level(NamedTuple):
     """Candidates at common centres: `keys` (degree, half-width in samples), whether each may be
     chosen, the power of the difference to its pilot, by how much its bias exceeds that difference
-    (zero where the pilot is of the next degree), and what noise of unit variance has of both: |k|²
-    and |k − k_pilot|². All `(C,)`.
+    (zero where the pilot is of the next degree), the moment that makes its bias, and what noise of
+    unit variance has of both: |k|² and |k − k_pilot|². All `(C,)`.
     """
 
     keys: list[tuple[int, int]]
     eligible: np.ndarray
     apart: np.ndarray
     share: np.ndarray
+    moments: np.ndarray
     rough: np.ndarray
     rough_apart: np.ndarray
 
@@ -69,7 +70,9 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
     white noise of the signal. The bias of a width shows in the difference to the slope of a pilot
     of half the width (for the narrowest, of the next degree), less the noise of that difference.
     What differs between two narrower widths by more than any noise could is bias of every wider
-    one too: two widths that both swallow a motion agree with each other.
+    one too: two widths that both swallow a motion agree with each other. The bias of a narrow one,
+    which the noise of its pilot hides, is at least what follows from wider ones as if the motion
+    were slow: at no frequency does it fall more steeply.
 
     **Arguments:** `signal`, `(N,)`, by default the position; `order` of the derivative, 1 or 2.
     """
@@ -79,19 +82,8 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
         recording = excerpt(recording)
     log = SampledSignal.of(recording, whole).trimmed()
     noise = min(log.noise(), LARGEST)
-    tried: list[tuple[float, float, int, int]] = []
-    least = dict.fromkeys(DEGREES, 0.0)  # of the bias² of wider candidates, by degree
-    for rung in _ladder(log.longest):
-        level = _level(log, rung, order)
-        if level is None:
-            continue
-        own, sure = (level.bias(noise, factor) for factor in (1.0, COLOURED))
-        for i, (degree, width) in enumerate(level.keys):
-            if not level.eligible[i]:
-                continue
-            bias = max(own[i], least[degree])
-            least[degree] = max(least[degree], sure[i])
-            tried.append((bias + noise**2 * level.rough[i], bias, degree, width))
+    levels = [_level(log, rung, order) for rung in _ladder(log.longest)]
+    tried = _risks([level for level in levels if level is not None], noise)
     if not tried or not log.step > 0:  # too short, or a clock that stands
         return Choice(DEGREES[0], HALF_WIDTHS[0], noise=noise)
     risk = min(tried)[0]
@@ -99,6 +91,25 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
     risk, bias, degree, width = min(trial for trial in tried if trial[3] == narrow)
     scale = log.step**order
     return Choice(degree, width, float(np.sqrt(risk)) / scale, float(np.sqrt(bias)) / scale, noise)
+
+
+def _risks(levels: list[_Level], noise: float) -> list[tuple[float, float, int, int]]:
+    """Risk, bias², degree and half-width of each candidate, the narrower levels first."""
+    found: dict[int, list[tuple[float, ...]]] = {degree: [] for degree in DEGREES}
+    for level in levels:
+        own, sure = (level.bias(noise, factor) for factor in (1.0, COLOURED))
+        rough, slow = noise**2 * level.rough, level.moments**2
+        for i in np.flatnonzero(level.eligible):
+            degree, width = level.keys[i]
+            found[degree].append((width, rough[i], own[i], sure[i], slow[i]))
+    tried = []
+    for degree, rows in found.items():
+        widths, roughs, own, sure, slow = np.array(rows).reshape(-1, 5).T
+        sure = slow * np.maximum.accumulate((sure / slow)[::-1])[::-1]
+        bias = np.maximum(own, np.maximum.accumulate(sure))
+        risks = zip((bias + roughs).tolist(), bias.tolist(), widths.tolist(), strict=True)
+        tried += [(risk, lost, degree, int(half)) for risk, lost, half in risks]
+    return tried
 
 
 def of_acceleration(recording: Recording, every: int = 1) -> tuple[Choice, ...]:
@@ -159,6 +170,7 @@ class _Shapes(NamedTuple):
     shapes: np.ndarray
     pilot: np.ndarray
     share: np.ndarray
+    moments: np.ndarray
     rough: np.ndarray
     apart: np.ndarray
 
@@ -167,13 +179,15 @@ class _Shapes(NamedTuple):
 def _shapes(widths: tuple[int, ...], order: int) -> _Shapes:
     keys = [(d, k) for d in (*DEGREES, DEGREES[-1] + 2) for k in widths if 2 * k >= d]
     shapes = np.stack([weights(k, d, order, max(widths)) for d, k in keys], axis=1)
-    moments = [_moment(shape, d, order) for shape, (d, _) in zip(shapes.T, keys, strict=True)]
+    moments = np.array(
+        [_moment(shape, d + order) for shape, (d, _) in zip(shapes.T, keys, strict=True)]
+    )
     pilot = np.array([_pilot(key, keys) for key in keys])
     same = np.array([keys[p][0] == d for p, (d, _) in zip(pilot, keys, strict=True)])
-    ratio = np.abs(np.array(moments)[pilot] / np.array(moments))
+    ratio = np.abs(moments[pilot] / moments)
     share = np.where(same & (ratio < 1), 1 / (1 - np.where(ratio < 1, ratio, 0.0)), 0.0)
     rough, apart = np.sum(shapes**2, axis=0), np.sum((shapes - shapes[:, pilot]) ** 2, axis=0)
-    return _Shapes(keys, shapes, pilot, share, rough, apart)
+    return _Shapes(keys, shapes, pilot, share, moments, rough, apart)
 
 
 def _level(log: SampledSignal, rung: _Rung, order: int) -> _Level | None:
@@ -184,7 +198,7 @@ def _level(log: SampledSignal, rung: _Rung, order: int) -> _Level | None:
     if max(fitting, default=0) < least and (block > 1 or fitting):
         return None
     widths = fitting or widths
-    keys, shapes, pilot, share, rough, apart = _shapes(tuple(widths), order)
+    keys, shapes, pilot, share, moments, rough, apart = _shapes(tuple(widths), order)
     reach = max(widths)
     if not uneven:
         # A bias is that of the few corners of a motion, so that its mean square is known the better
@@ -202,9 +216,10 @@ def _level(log: SampledSignal, rung: _Rung, order: int) -> _Level | None:
     power = np.mean((slopes - slopes[:, pilot]) ** 2, axis=0)
     scale = block**order
     offered = np.array([d <= DEGREES[-1] and k >= least for d, k in keys])
+    moments = moments * np.array([float(block) ** d for d, _ in keys])
     return _Level(
         [(d, k * block) for d, k in keys],
-        offered, power / scale**2, share, rough / scale**2, apart / scale**2,
+        offered, power / scale**2, share, moments, rough / scale**2, apart / scale**2,
     )  # fmt: skip
 
 
@@ -218,10 +233,11 @@ def _fitting(log: SampledSignal, block: int, widths: list[int]) -> list[int]:
     return []
 
 
-def _moment(shape: np.ndarray, degree: int, order: int) -> float:
-    """The lowest moment that the weights of that degree do not annul: that of their bias."""
-    offset = np.arange(len(shape)) - len(shape) // 2
-    return float(shape @ (offset / (len(shape) // 2)) ** (degree + order))
+def _moment(shape: np.ndarray, power: int) -> float:
+    """The moment of that power: of the degree and the order, the lowest that the weights do not
+    annul, which makes their bias.
+    """
+    return float(shape @ (np.arange(len(shape)) - len(shape) // 2.0) ** power)
 
 
 def _pilot(key: tuple[int, int], keys: list[tuple[int, int]]) -> int:
