@@ -11,10 +11,12 @@ from .baseline import as_given
 from .contest import Contest
 from .findings import Findings, Solution, alone
 from .motion import Motion
+from .predictions import with_predictions
 from .problem import Problem, across_reversals, problem_of, realigned
+from .regression import fit
 from .selection import Selection
 from .stepwise import select
-from .timing import late, overlooked, with_late_force
+from .timing import MOST_LATE, LateForce, late, overlooked, with_late_force
 
 # Forms of laws that do not compete.
 Refused = frozenset[Hashable]
@@ -28,7 +30,11 @@ def searched(
     To first order a delay is a column; what it leaves of second order would be selected too. So
     where the force acts late it is put back, and the search is done once more.
     """
-    found = aligned(motion, problem, seed, refused)
+    first = select(problem, seed, refused=refused, first=True)
+    at_once = _late_at_once(motion, problem, first, seed, refused)
+    if at_once is not None:
+        return at_once
+    found = aligned(motion, problem, seed, refused, first)
     lateness = None
     if any(traits(term).late for term in found.selection.last.terms):
         # Rows across reversals hold more than a delay or a lag, of which not all may be known.
@@ -38,15 +44,66 @@ def searched(
     lateness = lateness or overlooked(motion, *found, seed)
     if lateness is None:
         return alone(found)
-    undone, structure = lateness.undone(motion), found.problem.structure
-    again = problem_of(undone, structure, before=found.problem)
-    undelayed = aligned(undone, again, seed, refused)
-    findings = with_late_force(found, undelayed, lateness)
+    findings = with_late_force(found, _put_back(motion, found, lateness, seed, refused), lateness)
     after, before = (
         verification.error(each.selection.last, each.problem.evidence)
         for each in (findings.undelayed, found)
     )
     return alone(found) if not sure and after >= before else findings
+
+
+def _late_at_once(
+    motion: Motion, problem: Problem, first: Selection, seed: int, refused: Refused
+) -> Findings | None:
+    """The findings where the first is a late force that takes most of what there is.
+
+    Its second order would be fitted by other terms before it is put back. It is late where most
+    goes with it beside what is found then, too; else the whole search has to tell.
+    """
+    if not any(each.effect.late for each in first.selected):
+        return None
+    if 1 - first.last.energy / first.base.energy < MOST_LATE:
+        return None
+    lateness = late(motion, problem, first)
+    if lateness is None:
+        return None
+    found = Solution(problem, first)
+    undelayed = _put_back(motion, found, lateness, seed, refused)
+    later = _beside(motion, found, undelayed, lateness)
+    if later is None:
+        return None
+    if abs(later.time - lateness.time) > later.time_error:
+        lateness, undelayed = later, _put_back(motion, found, later, seed, refused)
+    if undelayed.problem.reversals:
+        found = Solution(across_reversals(motion, problem), first)
+    findings = with_late_force(found, undelayed, lateness)
+    others = findings.undelayed.selection.last
+    evidence = with_predictions(found.problem.evidence, others)
+    without = fit(others.terms, evidence, others.betas, 6)
+    error = verification.error(others, findings.undelayed.problem.evidence)
+    late_part = 1 - (error / verification.error(without, evidence)) ** 2
+    return findings if late_part >= MOST_LATE else None
+
+
+def _beside(
+    motion: Motion, found: Solution, undelayed: Solution, lateness: LateForce
+) -> LateForce | None:
+    """The late force beside the terms that are selected once it is put back, in slip."""
+    problem, selection = undelayed
+    if not selection.selected:
+        return lateness
+    in_slip = Solution(problem.in_slip or problem, selection.in_slip or selection)
+    both = with_late_force(found, in_slip, lateness)
+    return late(motion, *both.recorded)
+
+
+def _put_back(
+    motion: Motion, found: Solution, lateness: LateForce, seed: int, refused: Refused
+) -> Solution:
+    """The terms selected once a late force is put back."""
+    undone = lateness.undone(motion)
+    again = problem_of(undone, found.problem.structure, before=found.problem)
+    return aligned(undone, again, seed, refused)
 
 
 def nothing(problem: Problem) -> Findings:
@@ -63,14 +120,19 @@ def obeying(motion: Motion, structure: AbstractTerm, seed: int) -> Solution:
 
 
 def aligned(
-    motion: Motion, problem: Problem, seed: int, refused: Refused = frozenset()
+    motion: Motion,
+    problem: Problem,
+    seed: int,
+    refused: Refused = frozenset(),
+    first: Selection | None = None,
 ) -> Solution:
     """The terms selected, force and motion aligned by them.
 
     The base alone may be aligned falsely by what it lacks, so that the first term aligns them anew
-    before others are looked for; and all of them once more, if they still ask for it.
+    before others are looked for; and all of them once more, if they still ask for it. `first`: the
+    selection of the first term, where that is known.
     """
-    first = select(problem, seed, refused=refused, first=True)
+    first = first or select(problem, seed, refused=refused, first=True)
     if not first.selected:
         return _across(motion, problem, first, seed, refused)
     again = realigned(motion, problem, first.last)
