@@ -354,6 +354,30 @@ def test_a_late_force_is_a_delay_and_nothing_else(healthy):
 
 
 @pytest.mark.slow
+def test_a_delay_that_explains_most_is_put_back_before_more_is_searched(healthy, monkeypatch):
+    """Its time is that beside what is found then."""
+    spring = planted(healthy[0], terms.Spring(), (30.0,))
+    run = dataclasses.replace(spring, force=jnp.roll(spring.force, -10))
+    run = jax.tree.map(lambda x: x[:-12], run)
+    searches = []
+
+    def select(posed, *args, **kwargs):
+        found = stepwise.select(posed, *args, **kwargs)
+        searches.append(found.names)
+        return found
+
+    monkeypatch.setattr(search, "select", select)
+    posed = problem.problem_of(run, models.named("gaussian"))
+    found = search.searched(motion_of(run), posed, 0)
+    names = [each.effect.name for each in found.selection.selected]
+    assert names == ["spring", "transport_delay"]
+    assert searches[0] == {"transport_delay"}
+    assert all("transport_delay" not in names for names in searches[1:])
+    time, stiffness = (float(found.selection.last.alphas[i][0]) for i in (-1, -2))
+    assert time == pytest.approx(10e-3, abs=1.1e-3) and stiffness == pytest.approx(30, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
     gaussian = models.named("gaussian")
 
