@@ -15,7 +15,7 @@ from jaxfric.cli import main
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effects import effect
 from jaxfric.validation import proof
-from jaxfric.validation.concealed import OUTSIDE, names
+from jaxfric.validation.concealed import OUTSIDE, definitions, names
 from jaxfric.validation.proof import counting, running, scoring, trials, workers
 
 RANGE = (0.02, 0.3)
@@ -159,6 +159,27 @@ def test_parameters_are_compared_where_the_names_coincide():
     # Eight degrees of freedom: 2.31 standard errors.
     assert [p.held for p in found.parameters] == [True, False]
     assert [p.error for p in found.parameters] == pytest.approx([0.1, 0.3])
+
+
+def test_a_parameter_of_another_law_has_no_true_value_to_hold():
+    """A square wave has no amplitude of a sine, but its frequency."""
+    said = answer(
+        finding("periodic_disturbance", frequency=(2.0, 0.1), amplitude=(2.5, 0.1)),
+    )
+
+    def counted_in(name):
+        truth = {"frequency": 2.0, "amplitude": 2.0, "definition": name}
+        scored = scoring.score(
+            case("periodic_disturbance"), sealed(periodic_disturbance=truth), said
+        )
+        return [
+            [p.name for p in counting.parameters([scored], same=same)] for same in (True, False)
+        ]
+
+    assert counted_in("sine") == [["frequency", "amplitude"], []]
+    assert counted_in("square") == [["frequency"], ["amplitude"]]
+    for (of, name), parameters in definitions.UNLIKE.items():
+        assert definitions.definition(of, name).kind is not None and parameters
 
 
 def test_of_an_effect_named_twice_the_strongest_is_compared():

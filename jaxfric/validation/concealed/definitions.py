@@ -27,6 +27,17 @@ class Definition(NamedTuple):
     kind: Kind | None = None
 
 
+# A rounded gap has no edge, a square wave no amplitude of a sine, two time constants are not one,
+# a play without a spring has no windup, and a curve of another shape has another height at rest.
+UNLIKE = {
+    ("stribeck", "stretched"): ("stribeck_force", "stribeck_velocity"),
+    ("actuator_deadband", "smooth"): ("deadband",),
+    ("periodic_disturbance", "square"): ("amplitude",),
+    ("thermal_drift", "two_constants"): ("time_constant",),
+    ("backlash", "ideal_play"): ("windup",),
+}
+
+
 def _row(of: str, usual, further) -> list[Definition]:
     halves = (SCORED, DEVELOPMENT)
     return [
@@ -132,6 +143,11 @@ def definition(of: str, name: str) -> Definition:
 def half_of(of: str, name: str) -> str:
     """The half of a definition; of an effect that has but one, development."""
     return next((d.half for d in DEFINITIONS if (d.of, d.name) == (of, name)), DEVELOPMENT)
+
+
+def unlike(of: str, name: str) -> tuple[str, ...]:
+    """Parameters of a definition that the law of the library has no true value of."""
+    return UNLIKE.get((of, name), ())
 
 
 def usual(of: str, form: str = "") -> str:

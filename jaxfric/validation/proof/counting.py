@@ -87,9 +87,10 @@ def confusion(scores: Sequence[Score]) -> tuple[list[str], list[str], list[list[
     return true, named, counts
 
 
-def parameters(scores: Sequence[Score]) -> list[Parameter]:
-    """Of all effects that were rightly named."""
-    return [p for s in scores for p in s.parameters if p.effect in s.effects]
+def parameters(scores: Sequence[Score], same: bool = True) -> list[Parameter]:
+    """Of rightly named effects: those that mean the same in the machine, or the others."""
+    every = (p for s in scores for p in s.parameters if p.effect in s.effects)
+    return [p for p in every if p.same == same]
 
 
 def covered(found: Iterable[Parameter]) -> Rate:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from ...terms.effects import EFFECTS
 from ...terms.effects.actuator_saturation import ACTUATOR_SATURATION
+from ..concealed.definitions import unlike
 from .planning import Case
 from .trials import ANSWERS, REMEDY, SEALED, path, read
 
@@ -22,7 +23,8 @@ CALLED = {"force_limit": ACTUATOR_SATURATION.name}
 class Parameter(NamedTuple):
     """A parameter of a rightly named effect: both values, and whether the 95 % interval held it.
 
-    `held` is `None` where no standard error was given.
+    `held` is `None` where no standard error was given. `same`: whether it means the same in the
+    machine's definition of the effect and in the law of the library.
     """
 
     effect: str
@@ -30,6 +32,7 @@ class Parameter(NamedTuple):
     true: float
     found: float
     held: bool | None
+    same: bool = True
 
     @property
     def error(self) -> float:
@@ -240,7 +243,8 @@ def _parameters(finding: Mapping[str, Any], truth: Mapping[str, Any]) -> Iterato
             continue
         low, high = _ends(estimate)
         held = None if low is None else bool(low <= true <= high)
-        yield Parameter(effect, name, float(true), float(found), held)
+        same = name.rstrip("+-") not in unlike(effect, values.get("definition", ""))
+        yield Parameter(effect, name, float(true), float(found), held, same)
 
 
 def _ends(estimate: Mapping[str, Any]) -> tuple[float, float] | tuple[None, None]:

@@ -84,6 +84,7 @@ def report(
         _confusion(scores),
         "## Parameters of rightly named effects",
         _parameters(counted.parameters(scores)),
+        *_of_other_laws(counted.parameters(scores, same=False)),
         "## How sure, and how often true",
         _calibration(scores),
         "## Parameters and reduction of the held-out error, by size",
@@ -229,6 +230,16 @@ def _parameters(found: Sequence[Parameter]) -> str:
     rows.append(("all", "", *_errors_of(found)))
     head = ("effect", "parameter", "cases", "median error", "95 % interval held it")
     return table(head, rows)
+
+
+def _of_other_laws(found: Sequence[Parameter]) -> list[str]:
+    """Numbers that mean something else in the machine than in the law."""
+    if not found:
+        return []
+    text = (
+        "Of definitions whose law is another, so that the parameter has no true value, not counted:"
+    )
+    return [text, _parameters(found)]
 
 
 def _errors_of(some: Sequence[Parameter]) -> tuple[str, str, str]:
