@@ -40,6 +40,43 @@ def solve(term, beta, recording, rows: Rows, alpha=None):
     return alpha, jacobian, target - jacobian[:, : alpha.size] @ alpha
 
 
+class Heavy(NamedTuple):
+    """Mass times acceleration at the samples, `force`, N; the mean acceleration, m/s²; both `(N,)`.
+
+    By Lemma 1 its integral over a closed window with any function of velocity is zero. The sum over
+    samples is not, where few of them lie in a bump: a mass that is taken for friction. So beside a
+    bump it is taken off, by a mass that need not be exact.
+    """
+
+    force: Float[Array, " N"]
+    slope: Float[Array, " N"]
+
+
+def heavy(recording, limits: Scales, rows: Rows) -> Heavy:
+    """What is taken off the force of a prepared recording in the `rows` of closed windows."""
+    force, velocity = recording.force, recording.velocity
+    slope = _slope_in_slip(recording, limits)
+    wide = signals.mean_slope(recording, velocity, NEAR, limits.interval)
+    return Heavy(weighing.first_weighed(force, velocity, slope, wide, rows) * slope, slope)
+
+
+def _slope_in_slip(recording, limits: Scales) -> Float[Array, " N"]:
+    """The acceleration at the samples, m/s², by parabolas through three of one direction each.
+
+    Where the direction changes friction jumps, and with it the acceleration.
+    """
+    velocity = recording.velocity
+    way = jnp.sign(velocity)
+    alike = (way[1:] * way[:-1] > 0) & signals.continuous(recording, limits.interval)
+    slope = signals.mean_slope(recording, velocity, 1, limits.interval, alike)
+    before, after = jnp.pad(alike, (1, 0)), jnp.pad(alike, (0, 1))
+    # At the ends of a stretch the mean slope is that half a sample further inside.
+    first = ~before & after & jnp.roll(after, -1)
+    last = before & ~after & jnp.roll(before, 1)
+    inside = jnp.where(first, jnp.roll(slope, -1), jnp.roll(slope, 1))
+    return jnp.where(first | last, 2 * slope - inside, slope)
+
+
 class Solved(NamedTuple):
     """Affine parameters of the whole term, deviations of all parameters, the rows of the weak form
     that they are compared on, and the bias that open ends would leave.
@@ -52,7 +89,16 @@ class Solved(NamedTuple):
 
 
 def solved(
-    known, alpha, jacobian, error, term, recording, limits: Scales, rows: Rows, weak: Rows
+    known,
+    alpha,
+    jacobian,
+    error,
+    term,
+    recording,
+    limits: Scales,
+    rows: Rows,
+    weak: Rows,
+    heavy: Heavy | None = None,
 ) -> Solved:
     """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
     weight = rows.positive + rows.negative
@@ -71,8 +117,12 @@ def solved(
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
     # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
-    slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
-    spread = uncertainty.deviations(jacobian, error - weighed.mass * slope, weight, place)
+    if heavy is None:
+        slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
+        heavy = Heavy(jnp.zeros_like(slope), slope)
+    slope = heavy.slope
+    noise = error + heavy.force - weighed.mass * slope
+    spread = uncertainty.deviations(jacobian, noise, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
     push, friction = weighed.columns[:, :1], weighed.columns[:, 1:]
     rise = weak.rate(recording.force) - friction @ shift

@@ -151,12 +151,16 @@ solve_rows = programs.compiled(_solve_rows)
 
 
 class _Searched(NamedTuple):
-    """What the nonlinear parameters were searched in, and what was found; the velocity's noise."""
+    """What the nonlinear parameters were searched in, and what was found; the velocity's noise.
+
+    `heavy`: what was taken off the force in closed windows.
+    """
 
     limits: Scales
     noise: Float[Array, ""]
     rows: Rows
     found: Found
+    heavy: "assessment.Heavy | None"
 
 
 @programs.compiled
@@ -165,13 +169,17 @@ def _search_rows(magnitudes, term, recording, projection, width, given, grid) ->
     recording = _sanitised(recording)
     limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
     rows = projection.rows(recording, limits)
-    active = term if projection.keeps_inertia else _without_inertia(term)
+    active, heavy = term if projection.keeps_inertia else _without_inertia(term), None
+    if active.nonlinear and not projection.keeps_inertia:
+        heavy = assessment.heavy(recording, limits, rows)
+        rows = eqx.tree_at(lambda r: r.target, rows, rows.target - heavy.force)
     box = term_bounds(
         active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    return _Searched(limits, noise, rows, search(active, recording, rows, box, grid, alike))
+    found = search(active, recording, rows, box, grid, alike)
+    return _Searched(limits, noise, rows, found, heavy)
 
 
 @programs.compiled
@@ -179,7 +187,7 @@ def _assess(
     searched: _Searched, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
     """All parameters and what is known about them, from the nonlinear ones."""
-    limits, noise, rows, best = searched
+    limits, noise, rows, best, heavy = searched
     beta, converged, border, alpha = best[:4]
     finite = _finite(recording)
     recording = _sanitised(recording)
@@ -187,9 +195,9 @@ def _assess(
     active = term if projection.keeps_inertia else _without_inertia(term)
     alpha, jacobian, error = assessment.solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
-    minimum = jnp.sum(weight * error**2)
+    minimum = jnp.sum(weight * (error if heavy is None else error + heavy.force) ** 2)
     alpha, spread, design, pull = assessment.solved(
-        active.with_beta(beta), alpha, jacobian, error, term, recording, limits, rows, weak
+        active.with_beta(beta), alpha, jacobian, error, term, recording, limits, rows, weak, heavy
     )
     matrix = spread.covariance
     nothing = ~finite | (jnp.sum(weight) <= 0)

@@ -71,6 +71,27 @@ def weigh(
     return Weighed(mass[0], own, through, left, columns)
 
 
+def first_weighed(
+    force: Float[Array, " N"],
+    velocity: Float[Array, " N"],
+    slope: Float[Array, " N"],
+    wide: Float[Array, " N"],
+    rows: Rows,
+) -> Float[Array, ""]:
+    """The mass beside dry and viscous friction of each direction, before any fit, kg.
+
+    `slope`, the acceleration, m/s²; `wide`, its mean over other samples, which share no noise of
+    the velocity with it, as the instrument.
+    """
+    roots = [reduced.root(weight) for weight in (rows.positive, rows.negative)]
+    friction = jnp.stack([x for root in roots for x in (root, root * velocity)], axis=1)
+    root = jnp.stack(roots).sum(axis=0)
+    others = root[:, None] * jnp.stack([force, slope], axis=1)
+    left = reduced.project_out(reduced.orthonormal(friction), others)
+    gained, size = (root * wide) @ left
+    return gained / jnp.where(size > 0, size, jnp.inf)
+
+
 def open_ends(
     columns: Float[Array, "N q"], slope: Float[Array, " N"], weight: Float[Array, " N"]
 ) -> Float[Array, " q"]:

@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..data.recording import Recording
 from .clock import continuous, interval
@@ -67,14 +67,19 @@ def local_quadratic(
 
 
 def mean_slope(
-    recording: Recording, signal: Float[Array, " N"], reach: int, typical: Float[Array, ""]
+    recording: Recording,
+    signal: Float[Array, " N"],
+    reach: int,
+    typical: Float[Array, ""],
+    alike: Bool[Array, " M"] | None = None,
 ) -> Float[Array, " N"]:
     """The signal's mean slope from `reach` samples before each sample to as many after it, `(N,)`.
 
-    It ends where the recording breaks off, and is zero where a sample stands alone. `typical` is
-    the sampling [`interval`][], s.
+    It ends where the recording breaks off, or two samples are not `alike`, `(N - 1,)`; and is zero
+    where a sample stands alone. `typical` is the sampling [`interval`][], s.
     """
     linked, index = continuous(recording, typical), jnp.arange(recording.num_samples)
+    linked = linked if alike is None else linked & alike
     breaks_before = jnp.pad(~linked, (1, 0), constant_values=True)
     breaks_after = jnp.pad(~linked, (0, 1), constant_values=True)
     begin = jax.lax.cummax(jnp.where(breaks_before, index, 0))
