@@ -8,11 +8,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 import jaxfric as jf
 from jaxfric import online
 from jaxfric.cli import main
-from jaxfric.online import chart, feed, solving
+from jaxfric.online import chart, feed, moments, solving
 
 RATE, PERIOD = 500.0, 2.0
 
@@ -75,6 +76,56 @@ def test_the_parameters_are_those_of_the_axis_without_its_mass():
 def log_of(seconds, **how):
     t, x, v, u = stream(seconds, **how)
     return jf.Recording(t, u, position=x, velocity=v)
+
+
+@given(
+    speeds=st.lists(st.floats(1e-3, 3.9), min_size=1, max_size=20),
+    nodes=st.integers(4, 33),
+    reach=st.floats(2e-3, 1.9),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_wider_grid_holds_what_the_samples_would_have_made_there(speeds, nodes, reach):
+    """The law that lets nodes widen: sums moved to every second node lose nothing against it."""
+    narrow = np.geomspace(1e-3, reach, nodes)
+    wide = 1e-3 * (narrow / 1e-3) ** 2
+    inside = np.minimum(speeds, reach)
+
+    before, after = (np.array([_hat(at, k, inside) for k in range(nodes)]) for at in (narrow, wide))
+    ratio = narrow[1] / narrow[0]
+    np.testing.assert_allclose(moments.merged(before, ratio, np), after, atol=1e-9)
+
+
+def _hat(nodes, k, speeds):
+    """The share of node `k` in speeds, summed."""
+    return np.sum(np.interp(speeds, nodes, np.eye(len(nodes))[k]))
+
+
+@pytest.mark.parametrize("how", [{}, {"keep": 5.0}, {"window": 4}])
+def test_faster_samples_widen_the_nodes(how):
+    """Nothing of what was gathered is lost, and the object does what the scan does."""
+    values = samples(20).at[:3000, 1:].multiply(0.02)  # slow at first
+    narrow, _ = run(online.start(1e-3, 0.006, **how), values)
+    wide, _ = run(online.start(1e-3, 1.296, **how), values)
+    follower = online.Follower("coulomb-viscous", slowest=1e-3, fastest=0.006, **how)
+    for row in np.asarray(values).tolist():
+        follower.add(*row)
+    assert follower.fastest == pytest.approx(1.296)  # 6, 36, 1296 times the slowest
+    for one in (narrow, follower.state()):
+        np.testing.assert_allclose(one.nodes, wide.nodes, rtol=1e-9)
+        for ours, theirs in zip(one.total, wide.total, strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+    assert not np.isfinite(narrow.reference).any()
+
+
+def test_no_change_is_told_where_the_axis_only_moves_faster():
+    """The line through slow motion says nothing of the friction at ten times the speed."""
+    t, _, v, u = stream(60)
+    slow = np.where(t < 30, 0.1, 1.0)
+    v = slow * v
+    u = friction(v) + np.random.default_rng(1).normal(size=t.size)
+    follower = online.Follower("coulomb-viscous", slowest=1e-3, fastest=0.03)
+    told = [follower.add(*row) for row in np.stack([t, v, u], axis=1).tolist()]
+    assert not [change for change in told if change] and follower.fastest > 0.1
 
 
 @pytest.mark.parametrize("how", [{}, {"keep": 5.0}, {"window": 4}])
@@ -203,6 +254,24 @@ def test_watch_follows_a_file(tmp_path, capsys, monkeypatch):
     said = capsys.readouterr().out
     assert said.startswith(f"{path}: 500 Hz, force in N, position in m\n  Columns: time")
     assert "CHANGE" in said
+
+
+def test_watch_says_when_the_axis_moves_faster_than_at_first(tmp_path, capsys, monkeypatch):
+    """Ten seconds at a tenth of the speed decide no friction at full speed."""
+    monkeypatch.setenv("JAXFRIC_CACHE", "off")
+    t = np.arange(30 * 500) / 500
+    v = np.where(t < 10, 0.02, 0.2) * np.sin(np.pi * t)
+    u = np.sign(v) * 6 + 40 * v
+    rows = "\n".join(f"{a:.4f},{b:.8f},{c:.4f}" for a, b, c in zip(t, v, u, strict=True))
+    path = tmp_path / "axis.csv"
+    path.write_text(f"time,velocity,force\n{rows}\n")
+    assert main(["watch", str(path), "--once", "--json"]) == 0
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    faster = [d for d in told if d["event"] == "faster"]
+    assert len(faster) == 1 and 10 < faster[0]["time"] < 10.2 and faster[0]["fastest"] > 0.2
+    last = told[-1]["parameters"]
+    assert last["coulomb+"] == pytest.approx(6, rel=1e-2)
+    assert last["viscous-"] == pytest.approx(40, rel=1e-2)
 
 
 def test_watch_says_what_is_wrong(tmp_path, capsys, monkeypatch):

@@ -48,13 +48,14 @@ class Follower:
         return np.array([list(pair) for pair in pairs])
 
 
-def test_the_generated_c_follows_as_python_does(tmp_path):
+@pytest.mark.parametrize("fastest", [0.2, 0.02])  # as expected, and a tenth of what comes
+def test_the_generated_c_follows_as_python_does(tmp_path, fastest):
     how = {"keep": 20.0, "nodes": NODES}
     source, library = tmp_path / "axis.c", tmp_path / "axis.so"
-    source.write_text(online.c_source(1e-3, 0.2, name="axis", **how), encoding="utf-8")
+    source.write_text(online.c_source(1e-3, fastest, name="axis", **how), encoding="utf-8")
     c, python = (
         Follower(str(source), str(library)),
-        online.Follower(slowest=1e-3, fastest=0.2, **how),
+        online.Follower(slowest=1e-3, fastest=fastest, **how),
     )
     rows = np.array(samples(120.0, size=lambda t: np.where(t > 60, 1.15, 1.0)))
     rows[2000, 2] = np.nan  # a missing sample, and a gap

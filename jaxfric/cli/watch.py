@@ -52,6 +52,7 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
     for sample in moving:
         last = sample.time
         change = follower.add(*sample)
+        told.speeds(last)
         if change:
             told.change(change)
         if following == -math.inf:
@@ -76,7 +77,7 @@ def _generated(start: feed.Start, source: str, arguments: Namespace) -> int:
     write_text(arguments.c, c_source(start.slowest, start.fastest, **options))
     say(
         f"{arguments.c}: C99 for slip from {start.slowest:.3g} on and speeds up to "
-        f"{start.fastest:.3g}, as {source} has them."
+        f"{start.fastest:.3g} to begin with, as {source} has them."
     )
     return 0
 
@@ -85,7 +86,7 @@ class _Told:
     """What is printed: lines for a person, or one JSON document a line."""
 
     def __init__(self, follower: Follower, units: dict[str, str], plain: bool):
-        self._follower, self._json = follower, plain
+        self._follower, self._json, self._fastest = follower, plain, follower.fastest
         self._units = {"force": "N", "position": "m"} | units
         term = follower.term
         self._spelled = {
@@ -117,6 +118,18 @@ class _Told:
             f"{source}: {start.rate:.6g} Hz, force in {force}, position in {position}\n"
             f"  {stream.served}\n"
             f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.fastest:.3g} {speed}",
+        )
+
+    def speeds(self, time: float) -> None:
+        """That the axis moves faster than it did at first, once for each widening of the nodes."""
+        fastest = self._follower.fastest
+        if fastest == self._fastest:
+            return
+        self._fastest = fastest
+        self._put(
+            {"event": "faster", "time": time, "fastest": fastest},
+            f"{time:10.3f} s  faster than before: speeds up to {fastest:.3g} "
+            f"{self._units['position']}/s are told apart now, and changes are compared anew",
         )
 
     def parameters(self, time: float) -> None:

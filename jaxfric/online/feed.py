@@ -17,7 +17,7 @@ from ..data.recording import Recording
 HEAD = 2000
 # Fewer say nothing of a motion.
 LEAST = 100
-# The head need not hold the fastest motion; speeds beyond count as the fastest.
+# The head need not hold the fastest motion; speeds beyond widen the nodes, twice as coarse.
 ABOVE = 2.0
 # Between two looks at a file that grows, s.
 LOOK = 0.2

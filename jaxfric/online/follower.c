@@ -14,7 +14,7 @@
 
 #define @NAME@_NODES @NODES@
 static const double @NAME@_slowest = @SLOWEST@;   /* slip begins */
-static const double @NAME@_fastest = @FASTEST@;
+static const double @NAME@_fastest = @FASTEST@;   /* to begin with: a faster sample raises it */
 static const double @NAME@_keep = @KEEP@;   /* slip time after which a stroke weighs 1/e */
 static const double @NAME@_height = @HEIGHT@;   /* of the charts */
 static const double @NAME@_gap = @GAP@, @NAME@_whole = @WHOLE@, @NAME@_slack = @SLACK@;
@@ -33,7 +33,7 @@ typedef struct {
     @NAME@_sums total[2], stroke[2];
     double usual[2], last[3], interval, scale, reference[2][2];
     @NAME@_chart chart[2];
-    int count[2], inside[2], rising[2], started, compared;
+    int count[2], inside[2], rising[2], started, compared, settled;
 } @NAME@_state;
 
 /* A change: when, 0 forward or 1 backward, for how many strokes, and how much more friction. */
@@ -64,6 +64,14 @@ int @NAME@_solve(const @NAME@_state *s, int side, double parameters[2])
     return 1;
 }
 
+/* No reference until so many strokes of each direction are closed. */
+static void @NAME@_learn(@NAME@_state *s, int until)
+{
+    s->rising[0] = s->rising[1] = s->compared = 0;
+    memset(s->chart, 0, sizeof s->chart);
+    s->settled = until;
+}
+
 static void @NAME@_anew(@NAME@_state *s)
 {
     for (int side = 0; side < 2; side++) {
@@ -73,27 +81,57 @@ static void @NAME@_anew(@NAME@_state *s)
         const double kept = seconds > 0.0 ? fmin(1.0, 0.1 * s->usual[side] / seconds) : 0.0;
         for (int k = 0; k < @NAME@_NODES; k++) t->weight[k] *= kept, t->load[k] *= kept;
         t->square *= kept;
-        s->count[side] = s->inside[side] = s->rising[side] = 0;
+        s->count[side] = s->inside[side] = 0;
         memset(&s->stroke[side], 0, sizeof s->stroke[side]);
-        memset(&s->chart[side], 0, sizeof s->chart[side]);
     }
-    s->compared = 0;
+    @NAME@_learn(s, @NAME@_SETTLED);
+}
+
+static void @NAME@_reach(@NAME@_state *s, double fastest)
+{
+    const double ratio = log(fastest / @NAME@_slowest);
+    s->scale = (@NAME@_NODES - 1) / ratio;
+    for (int k = 0; k < @NAME@_NODES; k++)
+        s->speed[k] = @NAME@_slowest * exp(ratio * k / (@NAME@_NODES - 1));
 }
 
 void @NAME@_start(@NAME@_state *s)
 {
     memset(s, 0, sizeof *s);
-    const double ratio = log(@NAME@_fastest / @NAME@_slowest);
-    s->scale = (@NAME@_NODES - 1) / ratio;
-    for (int k = 0; k < @NAME@_NODES; k++)
-        s->speed[k] = @NAME@_slowest * exp(ratio * k / (@NAME@_NODES - 1));
+    s->settled = @NAME@_SETTLED;
+    @NAME@_reach(s, @NAME@_fastest);
+}
+
+/* Sums on nodes of twice the step: every second node stays, what is between two is shared. */
+static void @NAME@_merge(double *sums, double ratio)
+{
+    double over = 0.0;
+    for (int k = 0; k < @NAME@_NODES; k += 2) {
+        const double next = k + 1 < @NAME@_NODES ? sums[k + 1] : 0.0, up = next / (1.0 + ratio);
+        sums[k / 2] = sums[k] + over + next - up;
+        over = up;
+    }
+    int k = (@NAME@_NODES + 1) / 2;
+    for (sums[k++] = over; k < @NAME@_NODES; k++) sums[k] = 0.0;
+}
+
+/* Nodes up to fastest * fastest / slowest; a reference that reaches so far is learned anew. */
+static void @NAME@_widen(@NAME@_state *s)
+{
+    const double ratio = s->speed[1] / s->speed[0], fastest = s->speed[@NAME@_NODES - 1];
+    for (int side = 0; side < 2; side++) {
+        @NAME@_merge(s->total[side].weight, ratio), @NAME@_merge(s->total[side].load, ratio);
+        @NAME@_merge(s->stroke[side].weight, ratio), @NAME@_merge(s->stroke[side].load, ratio);
+    }
+    @NAME@_reach(s, fastest * fastest / @NAME@_slowest);
+    @NAME@_learn(s, (s->count[0] > s->count[1] ? s->count[0] : s->count[1]) + @NAME@_SETTLED);
 }
 
 /* A sample's time and impulse between the two nodes beside its speed. */
 static void @NAME@_share(@NAME@_state *s, int side, double above, double force, double time)
 {
     @NAME@_sums *stroke = &s->stroke[side];
-    const double speed = fmin(@NAME@_slowest + above, @NAME@_fastest);
+    const double speed = @NAME@_slowest + above;
     int k = (int)(log(speed / @NAME@_slowest) * s->scale);
     if (k > @NAME@_NODES - 2) k = @NAME@_NODES - 2;
     double part = (speed - s->speed[k]) / (s->speed[k + 1] - s->speed[k]);
@@ -149,7 +187,7 @@ static int @NAME@_close(@NAME@_state *s, int side, double time, @NAME@_change *c
     s->count[side]++;
     s->usual[side] += (seconds - s->usual[side]) / (s->count[side] < 50 ? s->count[side] : 50);
     if (!s->compared) {
-        if (s->count[0] >= @NAME@_SETTLED && s->count[1] >= @NAME@_SETTLED)
+        if (s->count[0] >= s->settled && s->count[1] >= s->settled)
             s->compared = @NAME@_solve(s, 0, s->reference[0]) & @NAME@_solve(s, 1, s->reference[1]);
         return 0;
     }
@@ -172,6 +210,7 @@ static int @NAME@_close(@NAME@_state *s, int side, double time, @NAME@_change *c
 int @NAME@_add(@NAME@_state *s, double time, double velocity, double force, @NAME@_change *change)
 {
     if (!isfinite(time + velocity + force)) return 0;
+    while (fabs(velocity) > s->speed[@NAME@_NODES - 1]) @NAME@_widen(s);
     const double before = s->last[1], load = s->last[2], step = time - s->last[0];
     const int first = !s->started;
     s->started = 1;

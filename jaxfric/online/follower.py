@@ -11,7 +11,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm
 from . import chart, moments
 from .chart import Chart
-from .moments import GAP, NODES, WHOLE, State, Sums
+from .moments import GAP, NODES, WHOLE, State, Sums, merged
 from .solving import Solution, friction_only, solve
 
 # Strokes of each direction before strokes are compared with what was identified from them.
@@ -36,7 +36,8 @@ class Follower:
 
     The arithmetic is that of [`update`][jaxfric.online.update], in plain Python, which is quicker
     one sample at a time. After `SETTLED` strokes of each direction the curve identified so far
-    becomes the reference of the charts; a change forgets nearly all and begins anew.
+    becomes the reference of the charts; a change forgets nearly all and begins anew. A faster
+    sample than `fastest` widens the nodes, and a reference that reaches so far is learned anew.
 
     **Arguments:** `model`, a name or a sum of functions of velocity; `slowest`, `fastest`, `keep`,
     `window`, `false_alarms` as for [`start`][jaxfric.online.start].
@@ -57,9 +58,7 @@ class Follower:
         self._how = {"keep": keep, "window": window, "false_alarms": false_alarms, "nodes": nodes}
         first = moments.start(slowest, fastest, **self._how)  # type: ignore[arg-type]
         self._nodes = np.asarray(first.nodes, float)
-        self._speeds = self._nodes.tolist()
-        self._slowest, self._fastest = self._speeds[0], self._speeds[-1]
-        self._scale = (nodes - 1) / math.log(self._fastest / self._slowest)
+        self._reach()
         self._height, self._keep, self._window = float(first.height), keep, window
         self._last: tuple[float, float, float] | None = None
         self._interval = 0.0
@@ -81,6 +80,32 @@ class Follower:
         self._count = [0, 0]
         self._inside = [False, False]
         self._stroke = [self._empty(), self._empty()]
+        self._learn(SETTLED)
+
+    def _reach(self) -> None:
+        """What depends on the nodes alone."""
+        self._speeds = self._nodes.tolist()
+        self._slowest, self._fastest = self._speeds[0], self._speeds[-1]
+        self._scale = (len(self._speeds) - 1) / math.log(self._fastest / self._slowest)
+
+    def _widen(self) -> None:
+        """Nodes up to fastest²/slowest, as [`wider`][jaxfric.online.moments.wider] has them."""
+        ratio = self._speeds[1] / self._slowest
+        self._nodes = self._slowest * (self._nodes / self._slowest) ** 2
+        self._reach()
+
+        def moved(weight, load, square) -> Sums:
+            return Sums(*(merged(np.asarray(x), ratio, np) for x in (weight, load)), square)
+
+        self._total = moved(*self._total)
+        self._ring = [[moved(*stroke) for stroke in side] for side in self._ring]
+        strokes = (moved(*stroke) for stroke in self._stroke)
+        self._stroke = [[s.weight.tolist(), s.load.tolist(), s.square] for s in strokes]
+        self._learn(max(self._count) + SETTLED)
+
+    def _learn(self, until: int) -> None:
+        """No reference until so many strokes of each direction are closed."""
+        self._settled = until
         self._reference: np.ndarray | None = None
         self._charts = [Chart(0.0, 0.0, 0.0, 0.0, 0.0)] * 2
         self._rising = [0, 0]
@@ -88,6 +113,11 @@ class Follower:
     def _empty(self) -> list:
         """Time and impulse at the nodes, and the square of the force."""
         return [[0.0] * len(self._speeds), [0.0] * len(self._speeds), 0.0]
+
+    @property
+    def fastest(self) -> float:
+        """The speed up to which speeds are told apart, m/s; a faster sample raises it."""
+        return self._fastest
 
     @property
     def strokes(self) -> tuple[int, int]:
@@ -100,6 +130,8 @@ class Follower:
         """
         if not math.isfinite(time + velocity + force):
             return None
+        while abs(velocity) > self._fastest:
+            self._widen()
         last, self._last = self._last, (time, velocity, force)
         if last is None:
             return None
@@ -134,7 +166,7 @@ class Follower:
         """A sample's time and impulse between the two nodes beside its speed."""
         weight, load, _ = stroke = self._stroke[side]
         speeds = self._speeds
-        speed = min(self._slowest + above, self._fastest)
+        speed = self._slowest + above
         place = min(int(math.log(speed / self._slowest) * self._scale), len(speeds) - 2)
         part = (speed - speeds[place]) / (speeds[place + 1] - speeds[place])
         part = min(max(part, 0.0), 1.0) * time
@@ -154,7 +186,7 @@ class Follower:
         self._count[side] += 1
         self._usual[side] += (seconds - self._usual[side]) / min(self._count[side], 50)
         if self._reference is None:
-            if min(self._count) >= SETTLED:
+            if min(self._count) >= self._settled:
                 self._reference = self._curve()
             return None
         compared = self._reference[side]

@@ -40,7 +40,8 @@ class Sums(NamedTuple):
 class State(NamedTuple):
     """All that is kept of a stream; a pytree of arrays of fixed shape.
 
-    - `nodes`: speeds, m/s, `(K,)`, rising geometrically from the slowest slip.
+    - `nodes`: speeds, m/s, `(K,)`, rising geometrically from the slowest slip; a faster sample
+      widens them.
     - `total`: the `Sums` of closed strokes in each direction, `(2, K)`, forward first.
     - `stroke`: those of the stroke under way; `inside`: whether its beginning was seen, `(2,)`.
     - `ring`: the last strokes of each direction where a window forgets, `(2, n, K)`; else `n` = 0.
@@ -88,8 +89,9 @@ def start(
     """The state before the first sample.
 
     **Arguments:** `slowest`, the smallest speed that counts as slip, m/s (four deviations of the
-    velocity's noise); `fastest`, the highest speed that is told apart, m/s; `keep`, slip time after
-    which a stroke weighs 1/e, s; or `window`, how many strokes of each direction count;
+    velocity's noise); `fastest`, the highest speed that is expected, m/s (a faster sample widens
+    the nodes); `keep`, slip time after which a stroke weighs 1/e, s; or `window`, how many strokes
+    of each direction count;
     `false_alarms`, of the change detection, a stroke of a direction.
 
     **Raises:** `ValueError` for speeds, times or rates that are none.
@@ -119,6 +121,39 @@ def reference(state: State, force: Float[Array, "2 K"]) -> State:
     return state._replace(reference=force, chart=chart.empty(state.strokes))
 
 
+def merged(sums: Float[Array, "... K"], ratio: Float[Array, ""], of=jnp) -> Float[Array, "... K"]:
+    """Sums over nodes, each `ratio` times the one before, on nodes of twice that step.
+
+    Every second node stays. A sum between two is shared as a sample of its speed is: the result is
+    what the samples would have made there themselves, since a share that is straight between wide
+    nodes is straight between narrow ones. `of`: the arrays' module, `numpy` on the host.
+    """
+    odd, spare = sums[..., 1::2], [(0, 0)] * (sums.ndim - 1)
+    up = odd / (1 + ratio)  # (r − 1) / (r² − 1) of it to the upper one
+
+    def at(first: int, values):
+        return of.pad(values, [*spare, (first, sums.shape[-1] - first - values.shape[-1])])
+
+    return at(0, sums[..., ::2]) + at(0, odd - up) + at(1, up)
+
+
+def wider(state: State) -> State:
+    """The state on nodes of twice the step, up to fastest²/slowest; a reference does not reach so
+    far, and has to be given anew.
+    """
+    nodes = state.nodes
+    ratio = nodes[1] / nodes[0]
+    wide = nodes[0] * (nodes / nodes[0]) ** 2
+
+    def moved(sums: Sums) -> Sums:
+        return Sums(merged(sums.weight, ratio), merged(sums.load, ratio), sums.square)
+
+    state = state._replace(
+        nodes=wide, total=moved(state.total), stroke=moved(state.stroke), ring=moved(state.ring)
+    )
+    return reference(state, jnp.full_like(state.reference, jnp.nan))
+
+
 def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
     """The state after one sample (time s, velocity m/s, force N), and what it brought.
 
@@ -126,9 +161,13 @@ def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
     shape `(N, 3)`, and under `jax.jit` and `jax.vmap`.
     """
     time, velocity, _ = sample
+    known = jnp.all(jnp.isfinite(sample))
+    state = jax.lax.while_loop(
+        lambda s: known & (jnp.abs(velocity) > s.nodes[-1]), wider, state
+    )  # as wide as the fastest sample needs
     step = time - state.last[0]
     usual = jnp.where(state.interval > 0, state.interval, step)
-    linked = (step > 0) & (step <= GAP * usual) & jnp.all(jnp.isfinite(sample))
+    linked = (step > 0) & (step <= GAP * usual) & known
     sign = jnp.asarray([1.0, -1.0], velocity.dtype)
     slowest = state.nodes[0]
     left, right = sign * state.last[1] - slowest, sign * velocity - slowest
@@ -149,7 +188,6 @@ def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
     after, news = _closed(state, closed, broken)
     # The mean step forgets, so that it follows a clock that changes.
     interval = jnp.where(linked, usual + 0.02 * (step - usual), state.interval)
-    known = jnp.all(jnp.isfinite(sample))
     return after._replace(
         inside=inside & ~closed,
         last=jnp.where(known, sample, state.last),
