@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hypothesis import given, settings, strategies as st
 
 import jaxfric as jf
 from jaxfric.identification.identified import result_names
@@ -435,3 +436,41 @@ def test_what_is_unusable_stays_in_its_row_without_a_word_of_numpy(velocity):
     found = jf.identify("coulomb-viscous", jf.stack(logs))  # a warning is an error here
     assert found[0].result_name == "successful"
     assert "successful" not in [row.result_name for row in found[2 if not velocity else 1 :]]
+
+
+@pytest.mark.slow
+def test_a_row_of_a_batch_says_what_it_says_alone():
+    """Each its own kernel, and weak form where its windows stay open; whatever the others are."""
+    good = recording(machine(), noise=0.1)
+    noisy = recording(machine(), noise=0.1, seconds=3.0)
+    rough = noisy.velocity + 2e-3 * jax.random.normal(jax.random.key(3), noisy.velocity.shape)
+    noisy = dataclasses.replace(noisy, velocity=rough, position=None)
+    # Ever faster: few samples lie between two moments of one velocity.
+    t, good = good.time, dataclasses.replace(good, position=None)
+    v, a = 0.05 + 0.02 * t + 0.01 * jnp.sin(5 * t), 0.02 + 0.05 * jnp.cos(5 * t)
+    rising = dataclasses.replace(
+        good, velocity=v, force=20 + 30 * v + 4 * a + 0.1 * jnp.sin(99 * t)
+    )
+    logs = [good, noisy, rising]
+    batch = jf.identify("coulomb-viscous", jf.stack(logs))
+    for log, row in zip(logs, batch, strict=True):
+        alone = jf.identify("coulomb-viscous", log)
+        assert (row.result_name, row.projection) == (alone.result_name, alone.projection)
+        for name, one in alone.parameters.items():
+            both = row.parameters[name]
+            np.testing.assert_allclose(both.value, one.value, rtol=1e-7, err_msg=name)
+            np.testing.assert_allclose(both.standard_error, one.standard_error, rtol=5e-3)
+    assert batch.projection == "mixed"
+
+
+@given(padding=st.integers(0, 5000))
+@settings(max_examples=4, deadline=None)
+def test_what_a_recording_is_padded_with_moves_no_interval(padding):
+    """By more than what a block of twice the rows makes of it."""
+    log = recording(machine("coulomb-viscous"), seconds=3.0, noise=0.1)
+    alone = jf.identify("coulomb-viscous", log)
+    padded = jf.identify("coulomb-viscous", jf.pad(log, log.num_samples + padding))
+    for name, one in alone.parameters.items():
+        both = padded.parameters[name]
+        np.testing.assert_allclose(both.value, one.value, rtol=1e-7, err_msg=name)
+        np.testing.assert_allclose(both.standard_error, one.standard_error, rtol=1e-2)

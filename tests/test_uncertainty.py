@@ -158,6 +158,25 @@ def test_the_sandwich_of_white_noise_is_the_classical_covariance():
     np.testing.assert_allclose(np.mean(draws, axis=0), classical, rtol=0.16)
 
 
+@pytest.mark.parametrize("place", [0.25, 0.9])
+def test_what_is_seen_for_a_short_while_is_no_surer_than_classically(place):
+    """At 0.9 of the record the variance was 0.4 of the classical one: A² may exceed one there."""
+    rng = np.random.default_rng(4)
+    time = (np.arange(6400) + 0.5) / 6400
+    brief = rng.normal(size=6400) * np.exp(-(((time - place) / 0.02) ** 2))
+    columns = jnp.asarray(np.stack([rng.normal(size=6400), brief], axis=1))
+    weight = jnp.ones(6400)
+    spread = jax.jit(
+        lambda e: uncertainty.deviations(columns, e, weight, uncertainty.places(weight)).covariance
+    )
+    inverse = jnp.linalg.pinv(columns)
+    drawn = [jnp.asarray(e) for e in rng.normal(size=(160, 6400))]
+    draws = [np.diagonal(spread(e - columns @ (inverse @ e))) for e in drawn]
+    classical = np.diagonal(np.linalg.inv(np.asarray(columns.T @ columns)))
+    ratio = np.mean(draws, axis=0) / classical
+    assert 0.84 < ratio[0] < 1.16 and 0.84 < ratio[1] < 2  # known to 4 %
+
+
 @pytest.mark.parametrize(
     ("degrees", "expected"),
     [(1, 12.7062), (2, 4.3027), (3, 3.1824), (5, 2.5706), (10, 2.2281), (28, 2.0484)],

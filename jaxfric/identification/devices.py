@@ -47,7 +47,7 @@ def identify(
     **Arguments:** `recordings`, made by `stack`, signals of shape `(B, N)`; with several processes
     the rows of this one: every process calls with as many rows, of the same length, and the same
     other arguments, among them the projection. `over`, from [`mesh`][jaxfric.devices.mesh]; the
-    others as there.
+    others as there. The rows share one kernel, of the median width, and one projection.
 
     **Returns:** what was identified of the rows given, arrays of numpy with a leading axis `B`.
 

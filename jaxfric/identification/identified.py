@@ -98,7 +98,7 @@ class Identified(eqx.Module):
     - `open_ends`: by how much the affine parameters would have been off had the whole record been
       used, open ends and all: M D⁻¹ ∫ v̇ g dt, in the order of the affine parameters, `(p,)`;
       zero in the weak form.
-    - `projection`: "closed_windows" or "weak_form".
+    - `weak`: whether it was found by the weak form and not in closed windows, as `projection` says.
     - `warnings`: the number of each of `jaxfric.checks.KINDS` that was found, NaN of the others,
       `(W,)`; all NaN inside `jax.jit`, where the signals have no values yet.
     - `rival`: the nonlinear parameters of another minimum that the data do not tell from the one
@@ -114,7 +114,7 @@ class Identified(eqx.Module):
     filtered_force_error: Float[Array, ""]
     cost: Float[Array, ""]
     open_ends: Float[Array, " p"]
-    projection: str = eqx.field(static=True)
+    weak: Bool[Array, ""]
     rival: Float[Array, " d"] | None = None
     warnings: Float[Array, " W"] = eqx.field(default_factory=checks.none)
     border: Bool[Array, " d"] | None = None
@@ -197,6 +197,12 @@ class Identified(eqx.Module):
         self._require_one("remarks")
         load = constant_load.remark(self)
         return (*checks.remarks(self.warnings, dict(self.model.units)), *([load] if load else ()))
+
+    @property
+    def projection(self) -> str:
+        """The way it was found, "closed_windows" or "weak_form"; "mixed" where rows differ."""
+        weak = np.asarray(self.weak)
+        return "weak_form" if weak.all() else "mixed" if weak.any() else "closed_windows"
 
     @property
     def names(self) -> tuple[str, ...]:

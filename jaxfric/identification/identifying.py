@@ -1,7 +1,7 @@
 """Identification: the grid in one batched call, the refinement, the mass, the intervals."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import equinox as eqx
@@ -18,7 +18,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
-from . import alignment, assessment
+from . import alignment, assessment, grouping
 from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .projections import AbstractProjection, Rows, WeakForm
@@ -76,24 +76,73 @@ def identify(
     given = recording.num_samples
     recording = recording if traced or batch else excerpt(recording)
     rows = [] if traced else ready_rows(recording)
-    prepared = None
-    if not traced:
+    how = _How(model, projection, bounds, grid, align, given)
+    found = _batch(how, recording, rows) if rows and batch else _together(how, recording, rows)
+    if throw:
+        raise_unless_successful(found)
+    return found
+
+
+class _How(NamedTuple):
+    """The arguments of [`identify`][], and of how many samples a recording may be an excerpt."""
+
+    model: AbstractTerm | Model | Identified | str
+    projection: AbstractProjection | None
+    bounds: Mapping[str, tuple[float, float]] | None
+    grid: int | None
+    align: bool
+    given: int
+
+
+def _batch(how: _How, recording: Recording, rows: Sequence[signals.Ready]) -> Identified:
+    """The rows of a batch, each with the kernel and the projection that it has alone."""
+    if isinstance(how.projection, WeakForm):
+        return _together(how, recording, rows)
+    keys = [
+        (signals.kernel_half_width(row.recording), grouping.length(np.asarray(row.recording.mask)))
+        for row in rows
+    ]
+
+    def solve(some: np.ndarray, key: tuple[int, int], how: _How = how) -> Identified:
+        width, samples = key
+        part = jax.tree.map(lambda x: x[some, :samples], recording)
+        own = [rows[i] for i in some]
+        own = [r._replace(recording=grouping.shortened(r.recording, samples)) for r in own]
+        return _together(how, part, own, width)
+
+    found = grouping.grouped(keys, solve)
+    if how.projection is not None or bool(np.all(found.weak)):
+        return found
+    wide = np.flatnonzero(np.asarray(found.covered) < LEAST_COVERED)
+    if not wide.size:
+        return found
+
+    def weakly(some: np.ndarray, key: tuple[int, int]) -> Identified:
+        return solve(wide[some], key, how._replace(projection=WeakForm(key[0])))
+
+    return grouping.replaced(found, wide, grouping.grouped([keys[i] for i in wide], weakly))
+
+
+def _together(
+    how: _How, recording: Recording, rows: Sequence[signals.Ready], width: int | None = None
+) -> Identified:
+    """One recording, or the rows of a batch by one program; `width`, of their kernel, if known."""
+    batch, prepared = recording.time.ndim == 2, None
+    if rows:
         prepared = together(recording, rows) if batch else _plain(rows[0].recording)
-    setup = set_up(model, recording, projection, bounds, grid, prepared=prepared)
+    setup = set_up(how.model, recording, *how[1:4], width=width, prepared=prepared)
     solve = solve_rows if batch else _identify
-    looked = None if traced else looked_at(recording, rows, given)
+    looked = looked_at(recording, rows, how.given) if rows else None
     found, design = solve(*setup)
     weak = WeakForm(setup.width)
-    if projection is None and setup.projection != weak and _too_open(found):
+    if how.projection is None and setup.projection != weak and _too_open(found):
         found, design = solve(*setup._replace(projection=weak))
         setup = setup._replace(projection=weak)
-    if align:
+    if how.align:
         found, design = _aligned(solve, setup, found, design)
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if looked and not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(found)):
         found = checked(found, design, recording, looked.result())
-    if throw:
-        raise_unless_successful(found)
     return found
 
 
@@ -136,10 +185,10 @@ def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identi
     def one(row):
         return _identify(term, row, projection, width, given, grid)
 
-    return jax.lax.map(one, recording, batch_size=_together(*recording.time.shape))
+    return jax.lax.map(one, recording, batch_size=_at_once(*recording.time.shape))
 
 
-def _together(count: int, samples: int) -> int:
+def _at_once(count: int, samples: int) -> int:
     """How many rows of so many samples go at once."""
     if jax.default_backend() != "cpu":
         return max(1, min(SAMPLES // samples, count))
@@ -237,7 +286,7 @@ def _assess(
         error,
         minimum,
         pull,
-        "weak_form" if projection.keeps_inertia else "closed_windows",
+        jnp.asarray(projection.keeps_inertia),
         jnp.where(ambiguous, rival, jnp.nan) if beta.size else None,
         jnp.full(len(checks.NAMES), jnp.nan, error.dtype),
         border if beta.size else None,

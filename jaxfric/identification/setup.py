@@ -73,7 +73,7 @@ def _plan(term, recording, projection, given) -> grids.Plan | None:
 
 
 def _width(projection: AbstractProjection | None, recording: Recording) -> int:
-    """Half-width of the weak form's kernel; a batch shares the median of a few rows' widths."""
+    """Half-width of the weak form's kernel; rows that share one have the median of a few rows'."""
     if isinstance(projection, WeakForm):
         return projection.half_width
     if recording.time.ndim == 1 or signals.is_traced(recording):

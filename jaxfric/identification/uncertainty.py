@@ -23,8 +23,9 @@ from . import reduced, small
 # the spectrum flat enough; the price is Student's t with 8 degrees: intervals 18 % longer than with
 # infinitely many.
 COSINES = 8
-# Pieces of the rows in each of which a cosine is one number: the fastest turns by 0.2 rad in one,
-# and its mean there is its middle to 0.2 %.
+# At least so many blocks of rows, in each of which a cosine is one number where it says how much
+# of a vote the fit has explained: the fastest turns by 0.2 rad in one, and its mean there is its
+# middle to 0.2 %.
 BLOCKS = 128
 
 
@@ -108,8 +109,12 @@ def deviations(
     **Arguments:** `jacobian`, derivative of the rows by the parameters, `(J, p)`; `error`, the
     residual, `(J,)`; `weight`, `(J,)`; `place`, from [`places`][].
     """
-    length = -(-weight.shape[0] // BLOCKS)
+    # A power of two: what a recording is padded with, alone or in a batch, moves no block.
+    length = 1 << max(0, ((weight.shape[0] - 1) // BLOCKS).bit_length() - 1)
     many = length * min(BLOCKS, max(1, reduced.PIECE // length))
+    more = -weight.shape[0] % many
+    jacobian = jnp.pad(jacobian, ((0, more), (0, 0)))
+    error, weight, place = (jnp.pad(x, (0, more)) for x in (error, weight, place))
 
     def products(jacobian, weight):
         return jacobian.T @ (weight[:, None] * jacobian)
@@ -117,16 +122,20 @@ def deviations(
     def blocks(jacobian, error, weight, place):
         """Products of the columns with themselves and with the error, and where a block stands."""
         table = jnp.concatenate([jacobian @ first, error[:, None]], axis=1)
-        table = (jnp.sqrt(weight)[:, None] * table).reshape(-1, length, table.shape[1])
-        own = jnp.einsum("bni,bnj->bij", table[:, :, :-1], table)
-        places = place.reshape(-1, length)
-        count = jnp.maximum(jnp.sum(places > 0, axis=1), 1).astype(place.dtype)
-        return own[:, :, :-1], own[:, :, -1], jnp.sum(places, axis=1) / count
+        table = jnp.sqrt(weight)[:, None] * table
+        waves = _cosines(jnp.pi * place)
+        scores = (waves * table[None, :, -1]) @ table[:, :-1]
+        table = table[:, :-1].reshape(-1, length, table.shape[1] - 1)
+        own = jnp.einsum("bni,bnj->bij", table, table)
+        used = (weight > 0).astype(place.dtype).reshape(-1, length)
+        sums = jnp.sum(used * place.reshape(-1, length), axis=1)
+        return own, sums / jnp.maximum(jnp.sum(used, axis=1), 1), scores
 
     gram = jnp.sum(reduced.by_pieces(products, (jacobian, weight), many), axis=0)
     first, pivots = reduced.nearly_white(jax.lax.stop_gradient(gram))
     pieces = reduced.by_pieces(blocks, (jacobian, error, weight, place), many)
-    own, scores, middles = (x.reshape(-1, *x.shape[2:]) for x in pieces)
+    own, middles = (x.reshape(-1, *x.shape[2:]) for x in pieces[:2])
+    scores = jnp.sum(pieces[2], axis=0)
     gram = jnp.sum(own, axis=0)
     white = reduced.whiten_again(gram, pivots)
     # The triangular factor R of the columns, from near = columns first.
@@ -148,30 +157,33 @@ def deviations(
 
 def _votes(
     own: Float[Array, "b p p"],
-    scores: Float[Array, "b p"],
+    scores: Float[Array, "K p"],
     white: Float[Array, "p p"],
     angle: Float[Array, " b"],
     seen: Bool[Array, " p"],
 ) -> Float[Array, "K p"]:
-    """The scores with each cosine's weights, freed of the fit's pull: (I − A²)⁻¹ Xᵀ C e, A = XᵀCX.
+    """The scores with each cosine's weights, freed of the fit's pull: (I − A²H⁻¹)⁻¹ Xᵀ C e.
 
-    X are the columns of the basis that are `seen`, near `white`, of which `own` are the products
-    and `scores` those with the error, block by block; C is a cosine: the fit leaves e = (I − X Xᵀ)
-    d of the disturbance d, so that of white noise the vote has the covariance XᵀC²X − A², too small
-    by A². It enters by 15/16, which limits what a direction that the fit explains by itself is
-    credited with.
+    X are the columns of the basis that are `seen`, near `white`, of which `own` are the products,
+    block by block, and `scores` those with the error; C is a cosine, A = Xᵀ C X and H = Xᵀ C² X:
+    the fit leaves e = (I − X Xᵀ) d of the disturbance d, so that of white noise the vote has the
+    covariance H − A² instead of H. A² is never more than H, and near it only in a direction that
+    few moments tell. It enters by 15/16, which limits what a direction that the fit explains by
+    itself is credited with.
     """
     waves = _cosines(angle)
-    own = jnp.einsum("kb,bij->kij", waves, own)
-    own = jnp.einsum("ia,kij,jb->kab", white, own, white)
-    own = jnp.where(seen[:, None] & seen[None, :], own, 0.0)
-    scores = jnp.where(seen, waves @ scores @ white, 0.0)
-    identity = jnp.eye(len(white), dtype=white.dtype)
 
-    def freed(own, score):
-        return small.solve_positive(identity - (15 / 16) * own @ own, score)[0]
+    def by(weights):
+        sums = jnp.einsum("kb,bij->kij", weights, own)
+        sums = jnp.einsum("ia,kij,jb->kab", white, sums, white)
+        return jnp.where(seen[:, None] & seen[None, :], sums, 0.0)
 
-    return jax.vmap(freed)(own, scores)
+    scores = jnp.where(seen, scores @ white, 0.0)
+
+    def freed(pull, power, score):
+        return power @ small.solve_positive(power - (15 / 16) * pull @ pull, score)[0]
+
+    return jax.vmap(freed)(by(waves), by(waves**2), scores)
 
 
 def _cosines(angle: Float[Array, " n"]) -> Float[Array, "K n"]:

@@ -95,7 +95,8 @@ class Follower:
         self._reach()
 
         def moved(weight, load, square) -> Sums:
-            return Sums(*(merged(np.asarray(x), ratio, np) for x in (weight, load)), square)
+            weight, load = (merged(np.asarray(x), ratio, np) for x in (weight, load))
+            return Sums(weight, load, square)
 
         self._total = moved(*self._total)
         self._ring = [[moved(*stroke) for stroke in side] for side in self._ring]

@@ -132,10 +132,10 @@ def counter_velocity(
     return velocity.at[0].set(velocity[1])
 
 
-def kernel_half_width(recording: Recording) -> int:
+def kernel_half_width(recording: Recording, least: int = 16) -> int:
     """Half-width, in samples, of the weak form's kernel for a prepared recording.
 
-    The shortest of the ladder, from 16 samples (on which the kernel's quadrature is exact to
+    The shortest of the ladder, from `least` samples (on 16 the kernel's quadrature is exact to
     rounding), for which the noise of velocity or position is under a thousandth of the power of
     the acceleration column, so that it biases the mass by under 0.1 %; but an eighth of the typical
     slip stretch at most, so that most rows survive the reversals. Inside jit, where the
@@ -150,13 +150,16 @@ def kernel_half_width(recording: Recording) -> int:
     position = recording.position
     jitter = 0.0 if position is None else host_white_noise(np.asarray(position), linked)
     slipping = velocity[np.abs(velocity) > limits.slowest]
-    stretches = int(np.count_nonzero(np.diff(np.sign(slipping)))) + (recording.num_segments or 1)
-    longest = int(np.count_nonzero(recording.mask)) // stretches // 8
+    # Not `num_segments`, which a batch has of its row with the most.
+    valid = np.asarray(recording.mask)
+    pieces = len(np.unique(np.asarray(recording.segment)[valid]))
+    stretches = int(np.count_nonzero(np.diff(np.sign(slipping)))) + max(1, pieces)
+    longest = int(np.count_nonzero(valid)) // stretches // 8
     fitting = [k for k in HALF_WIDTHS if k <= max(2, longest)]
     broken = np.pad(np.cumsum(~linked), (1, 0))
     if not limits.interval > 0:  # a clock that stands
         return fitting[-1]
-    for width in (k for k in fitting if k >= 16):
+    for width in (k for k in fitting if k >= least):
         shape = weights(width, 2) / limits.interval
         whole = broken[2 * width :] == broken[: -2 * width]
         slopes = np.convolve(velocity, shape[::-1], "valid")
