@@ -90,7 +90,7 @@ def select(
     recording = excerpt(recording)
     prepared = signals.prepare(recording)
     if isinstance(candidates, Mapping):
-        width = signals.kernel_half_width(prepared)
+        width = signals.kernel_half_width(prepared, standings.NARROWEST)
         fold = _folds(prepared, folds)
         found = [
             _standing(name, term, prepared, width, fold, folds) for name, term in candidates.items()
