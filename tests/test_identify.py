@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import jaxfric as jf
+from jaxfric.identification import identifying
 from jaxfric.identification.identified import result_names
 from jaxfric.simulation.errors import force_error, relative_error
 
@@ -474,3 +475,53 @@ def test_what_a_recording_is_padded_with_moves_no_interval(padding):
         both = padded.parameters[name]
         np.testing.assert_allclose(both.value, one.value, rtol=1e-7, err_msg=name)
         np.testing.assert_allclose(both.standard_error, one.standard_error, rtol=1e-2)
+
+
+SHARP = {
+    "inertia": 0.8, "coulomb+": 6.0, "viscous+": 4.0, "coulomb-": 5.4, "viscous-": 4.4,
+    "stribeck_force+": 2.5, "stribeck_velocity+": 0.05,
+    "stribeck_force-": 2.75, "stribeck_velocity-": 0.0525,
+}  # fmt: skip
+
+
+def brisk(rate, resolution=None):
+    """An axis that crosses its Stribeck velocity within some milliseconds."""
+    t = np.arange(int(20 * rate)) / rate
+    waves = ((0.5, 0.3, 0.0), (0.15, 1.1, 1.0), (0.03, 3.0, 0.0))
+    position = sum(a * np.sin(2 * np.pi * f * t + phase) for a, f, phase in waves)
+    model = jf.models.from_parameters(jf.models.gaussian(), SHARP)
+    encoder = None if resolution is None else jf.Encoder(resolution=resolution)
+    return jf.simulate(
+        model, jf.Recording(t, 0 * t, position), jf.PD(4000.0, 110.0), force_noise=0.05,
+        key=jax.random.key(0), encoder=encoder, substeps=16,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_bump_that_few_samples_cross_holds_no_mass():
+    """The sum over samples of a mass times acceleration is no integral: Lemma 1 is for these."""
+    run = brisk(500.0)
+    found = jf.identify("gaussian", run)
+    assert found.projection == "closed_windows" and off(found, SHARP).max() < 1.5
+    aligned = jf.identify("gaussian", run, align=True)
+    for sign in "+-":
+        height = float(aligned.parameters[f"stribeck_force{sign}"].value)
+        assert height == pytest.approx(SHARP[f"stribeck_force{sign}"], rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_velocity_from_the_position_takes_nothing_off_a_bump_in_silence(monkeypatch):
+    run = dataclasses.replace(brisk(1000.0, 1e-5), velocity=None)
+    found = jf.identify("gaussian", run)
+    assert off(found, SHARP).max() < 1.5
+    batch = jf.identify("gaussian", jf.stack([run, run]))[1]
+    for name, own in batch.parameters.items():
+        assert float(own.value) == pytest.approx(float(found.parameters[name].value), rel=1e-6)
+        error = float(found.parameters[name].standard_error)
+        assert float(own.standard_error) == pytest.approx(error, rel=1e-3)
+
+    def as_chosen(solve, setup, rows, prepared, found, design):
+        return setup, found, design, np.zeros(1)
+
+    monkeypatch.setattr(identifying, "narrowed", as_chosen)
+    assert off(jf.identify("gaussian", run), SHARP).max() > 2

@@ -41,7 +41,8 @@ def solve(term, beta, recording, rows: Rows, alpha=None):
 
 
 class Heavy(NamedTuple):
-    """Mass times acceleration at the samples, `force`, N; the mean acceleration, m/s²; both `(N,)`.
+    """Mass times acceleration at the samples, `force`, N; the acceleration, `slope`, and by how
+    much that is unsure at the ends of a stretch, `rough`, m/s²; all `(N,)`.
 
     By Lemma 1 its integral over a closed window with any function of velocity is zero. The sum over
     samples is not, where few of them lie in a bump: a mass that is taken for friction. So beside a
@@ -50,18 +51,21 @@ class Heavy(NamedTuple):
 
     force: Float[Array, " N"]
     slope: Float[Array, " N"]
+    rough: Float[Array, " N"]
 
 
 def heavy(recording, limits: Scales, rows: Rows) -> Heavy:
     """What is taken off the force of a prepared recording in the `rows` of closed windows."""
     force, velocity = recording.force, recording.velocity
-    slope = _slope_in_slip(recording, limits)
+    slope, rough = _slope_in_slip(recording, limits)
     wide = signals.mean_slope(recording, velocity, NEAR, limits.interval)
-    return Heavy(weighing.first_weighed(force, velocity, slope, wide, rows) * slope, slope)
+    mass = weighing.first_weighed(force, velocity, slope, wide, rows)
+    return Heavy(mass * slope, slope, rough)
 
 
-def _slope_in_slip(recording, limits: Scales) -> Float[Array, " N"]:
-    """The acceleration at the samples, m/s², by parabolas through three of one direction each.
+def _slope_in_slip(recording, limits: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """The acceleration at the samples, m/s², by parabolas through three of one direction each, and
+    what these change of straight lines.
 
     Where the direction changes friction jumps, and with it the acceleration.
     """
@@ -74,7 +78,8 @@ def _slope_in_slip(recording, limits: Scales) -> Float[Array, " N"]:
     first = ~before & after & jnp.roll(after, -1)
     last = before & ~after & jnp.roll(before, 1)
     inside = jnp.where(first, jnp.roll(slope, -1), jnp.roll(slope, 1))
-    return jnp.where(first | last, 2 * slope - inside, slope)
+    rough = jnp.where(first | last, slope - inside, 0.0)
+    return slope + rough, rough
 
 
 class Solved(NamedTuple):
@@ -119,18 +124,23 @@ def solved(
     # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
     if heavy is None:
         slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
-        heavy = Heavy(jnp.zeros_like(slope), slope)
-    slope = heavy.slope
-    noise = error + heavy.force - weighed.mass * slope
+        noise = error - weighed.mass * slope
+    else:
+        slope = heavy.slope
+        noise = error + heavy.force - weighed.mass * slope
     spread = uncertainty.deviations(jacobian, noise, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
     push, friction = weighed.columns[:, :1], weighed.columns[:, 1:]
     rise = weak.rate(recording.force) - friction @ shift
     heavier = _moved(push, rise, weak.positive + weak.negative)
     shift = jnp.insert(shift, index[0], heavier[0])
+    spread = weighed.beside(spread, index[0])
+    if heavy is not None:
+        off = _moved(jacobian, weighed.mass * heavy.rough, weight)
+        spread = spread.beyond(jnp.insert(off, index[0], off @ weighed.through))
     return Solved(
         jnp.insert(alpha, index[0], weighed.mass),
-        weighed.beside(spread, index[0]),
+        spread,
         _design(_inserted(weighed.columns, index[0]), weighed.left, weak, shift),
         jnp.insert(pull, index[0], 0.0),
     )

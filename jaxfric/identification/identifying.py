@@ -21,6 +21,7 @@ from ..terms.sample import Scales
 from . import alignment, assessment, grouping
 from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
+from .narrowing import narrowed, reaching
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
 from .setup import Setup, ready_rows, set_up, together
@@ -127,9 +128,12 @@ def _together(
     how: _How, recording: Recording, rows: Sequence[signals.Ready], width: int | None = None
 ) -> Identified:
     """One recording, or the rows of a batch by one program; `width`, of their kernel, if known."""
-    batch, prepared = recording.time.ndim == 2, None
-    if rows:
-        prepared = together(recording, rows) if batch else _plain(rows[0].recording)
+    batch = recording.time.ndim == 2
+
+    def ready(rows):
+        return together(recording, rows) if batch else _plain(rows[0].recording)
+
+    prepared = ready(rows) if rows else None
     setup = set_up(how.model, recording, *how[1:4], width=width, prepared=prepared)
     solve = solve_rows if batch else _identify
     looked = looked_at(recording, rows, how.given) if rows else None
@@ -138,8 +142,13 @@ def _together(
     if how.projection is None and setup.projection != weak and _too_open(found):
         found, design = solve(*setup._replace(projection=weak))
         setup = setup._replace(projection=weak)
+    apart = None
+    if rows and setup.term.nonlinear:
+        setup, found, design, apart = narrowed(solve, setup, rows, ready, found, design)
     if how.align:
         found, design = _aligned(solve, setup, found, design)
+    if apart is not None and apart.any():
+        found = reaching(found, apart)
     found = eqx.tree_at(lambda f: f.model, found, _named_in(found.model, recording.units))
     if looked and not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(found)):
         found = checked(found, design, recording, looked.result())

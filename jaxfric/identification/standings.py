@@ -23,8 +23,8 @@ FEWER, EXPONENTS = 24, (0.5, 1.0, 1.5, 2.0)
 # Beside columns of norm one: what is spanned by others gets no part, nothing else changes.
 RIDGE = 1e-11
 
-# Half-width of the kernel, samples, where the noise allows it. Kernels that hold a reversal are left
-# out, and the slow motion beside it, where a bump shows, with them: so the least that averages.
+# Half-width of the kernel, samples, where the noise allows it. Kernels that hold a reversal are
+# left out, and with them the slow motion beside it, where a bump shows: so the least that averages.
 NARROWEST = 4
 
 SHAPES = {

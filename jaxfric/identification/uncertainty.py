@@ -97,6 +97,11 @@ class Deviations(NamedTuple):
         hidden = jnp.where(self.hidden, jnp.inf, 0.0).astype(self.votes.dtype)
         return self.votes.T @ self.votes + jnp.diag(hidden)
 
+    def beyond(self, off: Float[Array, " p"]) -> "Deviations":
+        """The same with 95 % intervals that reach as far as the parameters may be off, `(p,)`."""
+        vote = off / student_quantile(0.975, COSINES)
+        return Deviations(jnp.concatenate([self.votes, vote[None, :]]), self.hidden)
+
 
 def deviations(
     jacobian: Float[Array, "J p"],
