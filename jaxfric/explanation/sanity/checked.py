@@ -18,7 +18,7 @@ from ..figures import Figures, cast
 from ..finding import Finding
 from . import limits, wiring
 from .contact import Contact, contacts
-from .faults import Faults, FaultSearch, find, put_right
+from .faults import Faults, FaultSearch, find_each, put_right
 from .preceding import p_value, with_preceding
 from .rows import Part, Rows, rows_of
 from .table import EQUATIONS, Check, checks_of
@@ -93,11 +93,10 @@ def check_logs(parts: Sequence[Part]) -> list[CheckedSimulator]:
         bounds = [_limit(part) for part in parts]
         clipped = [_arrived(part, bound) for part, bound in zip(parts, bounds, strict=True)]
         able = not wired.said or not wired.everywhere
-        seen = find(clipped) if able else FaultSearch(Faults(), {}, (), raw)
+        seen = find_each(clipped) if able else [FaultSearch(Faults(), {}, (), [r]) for r in raw]
         ends = zip(bounds, blocked, strict=True)
         return [
-            _corrected(*each, seen, wired)
-            for each in zip(parts, clipped, raw, seen.rows, ends, strict=True)
+            _corrected(*each, wired) for each in zip(parts, clipped, raw, seen, ends, strict=True)
         ]
 
 
@@ -144,10 +143,10 @@ def _arrived(part: Part, bound: Estimate | None) -> Part:
 
 
 def _corrected(
-    raw: Part, clipped: Part, before: Rows, after: Rows,
-    ends: tuple[Estimate | None, Sequence[Contact]], seen: FaultSearch, wired,
+    raw: Part, clipped: Part, before: Rows, seen: FaultSearch,
+    ends: tuple[Estimate | None, Sequence[Contact]], wired,
 ) -> CheckedSimulator:  # fmt: skip
-    faults, (bound, blocked) = seen.faults, ends
+    faults, (bound, blocked), (after,) = seen.faults, ends, seen.rows
     simulator = clipped.simulator
     if any(faults.zeros.values()) and isinstance(simulator, Mujoco):
         simulator = simulator.with_zeros(faults.zeros)

@@ -56,7 +56,8 @@ class Faults(NamedTuple):
 
 class FaultSearch(NamedTuple):
     """Where the search ended: the faults, what can be seen of those that are none, the rows, and
-    the part of the mismatch that they and the wrong values leave.
+    the part of the mismatch that they and the wrong values leave. `alone`: whether one joint's force
+    has a clock of its own, beside others that are on time.
     """
 
     faults: Faults
@@ -64,6 +65,36 @@ class FaultSearch(NamedTuple):
     chosen: tuple[str, ...]
     rows: list[Rows]
     left: float = 1.0
+    alone: bool = False
+
+
+def find_each(parts: Sequence[Part]) -> list[FaultSearch]:
+    """The search of each joint: zeros of all joints, and the clock of the log or of one force.
+
+    Among joints that are on time one that is late is a small part of the mismatch, and other
+    joints' values imitate it: each joint is asked about its clock by itself too.
+    """
+    seen = find(parts)
+    if not seen.faults.clock and len(parts) > 1:
+        own = [find([part]).faults for part in parts]
+        own = [each if each.clock and not each.zeros else Faults() for each in own]
+        if any(each.clock for each in own):
+            on_time = [
+                part._replace(recording=put_right(part.recording, each))
+                for part, each in zip(parts, own, strict=True)
+            ]
+            seen = find(on_time)
+            if not seen.faults.clock:
+                return [_with_clock(seen, i, each) for i, each in enumerate(own)]
+            seen = find(parts)
+    return [seen._replace(rows=[rows]) for rows in seen.rows]
+
+
+def _with_clock(seen: FaultSearch, number: int, own: Faults) -> FaultSearch:
+    """The search of all joints as one joint's, which has a clock of its own, or has not."""
+    errors = {**seen.faults.errors, **own.errors}
+    faults = seen.faults._replace(late=own.late, drift=own.drift, errors=errors)
+    return seen._replace(faults=faults, rows=[seen.rows[number]], alone=own.clock)
 
 
 def find(parts: Sequence[Part]) -> FaultSearch:

@@ -136,7 +136,8 @@ def _clock(part: Part, seen: FaultSearch) -> Check:
         late = Estimate(np.float64(faults.late), np.float64(max(error, 1e-12)), "s")
         way = "late" if faults.late > 0 else "early"
         size = quantity(late._replace(value=np.float64(abs(faults.late))))
-        text = f"The force has another clock than the motion: it is {size} {way}"
+        whose = "The force of this joint alone" if seen.alone else "The force"
+        text = f"{whose} has another clock than the motion: it is {size} {way}"
         if faults.drift:
             error = faults.errors.get(DRIFT, 0.0)
             text += (
