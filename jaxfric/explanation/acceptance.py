@@ -8,7 +8,7 @@ from ..terms.effect import Effect
 from .contest import Contest, Finalist, Trial
 from .evidence import Evidence
 from .predictions import with_predictions
-from .problem import BETWEEN, LEAST_SHARE, WideKernels
+from .problem import BETWEEN, LEAST_SHARE, LINEARITY, WideKernels
 from .regression import Fit, fast, fit
 from .selection import SelectedTerm
 from .significance import DRAWS, LEVEL
@@ -22,11 +22,6 @@ LATER_SHARE = 0.05
 # of time, too, and a wave, a step or pushes take a third of it: for those there is no such ease.
 OF_BASE, LEAST_OF_BASE = 0.01, 1e-4
 MOST = 1 / 3
-# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
-# force's root mean square, cannot be told from the sensor whatever its p-value.
-LINEARITY = 2e-3
-
-
 # Sharp terms hold the very noise that they are tested against, and of a force of one moment no
 # other block of the recording tells whether it was chance: none of the draws may be as good.
 RAREST = 1.5 / (1 + DRAWS)

@@ -6,7 +6,7 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording
 from ..data.shifting import shifted
-from ..terms import KNOWN_FORCE, KNOWN_REST
+from ..terms import KNOWN_FEEDBACK, KNOWN_FORCE, KNOWN_REST, at_other_times
 from ..terms.sample import Scales
 from .motion import padded_length
 
@@ -44,7 +44,9 @@ def node_signals(
         series["position"] = np.asarray(recording.position, float)
     series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
     if delay:
-        series["force"] = _later(time, series["force"], run, delay)
+        series["force"] = at_other_times(
+            recording, series["force"], lambda force: _later(time, force, run, delay)
+        )
     centres = np.arange(0, len(time), step)
     offsets = np.arange(-(step - 1), step)
     at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
@@ -63,7 +65,7 @@ def node_signals(
     # and the columns' weights take it off again, so that force and columns are averaged alike. So
     # is what the derivative took off the velocity, which would look like a load on a spring.
     inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    forces = {"force", f"channel {KNOWN_FORCE}", f"channel {KNOWN_REST}"}
+    forces = {"force", *(f"channel {n}" for n in (KNOWN_FORCE, KNOWN_REST, KNOWN_FEEDBACK))}
     for name in set(means) - forces - {"time", "elapsed"}:
         values = means[name]
         bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]

@@ -5,11 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data.recording import Recording
+from ..terms import KNOWN_FEEDBACK
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from ..terms.effects.late import TransportDelay
 from .candidates import CandidateSet
 from .evidence import Evidence, gather
+from .fewest import fewest
+from .least_squares import orthonormal
 from .motion import Motion, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
@@ -24,8 +27,6 @@ LEAST_SHARE = 0.03
 # Alignments that differ by less than this part of a sample, and explain next to nothing of what is
 # left, make no difference worth another search.
 ALIGNED = 0.1
-
-
 # Width of a kernel between the narrow one and one of twice its width, in parts of the narrow one.
 BETWEEN = 4 / 3
 # Force that acts is as large through a kernel of twice the width. The noise of the acceleration is
@@ -33,6 +34,11 @@ BETWEEN = 4 / 3
 PERSISTS = 2**-1.25
 # Rows through that kernel and through the widest; `None` where too few would be left.
 WideKernels = tuple[Evidence | None, Evidence | None]
+
+
+# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
+# force's root mean square, cannot be told from the sensor whatever its p-value.
+LINEARITY = 2e-3
 
 
 class Problem(NamedTuple):
@@ -205,6 +211,33 @@ def _wider(
     return wide
 
 
+def _without_feedback(seen: Evidence) -> Evidence:
+    """With the predicted force of the command alone: a servo is on time with the motion."""
+    channels = seen.motion.channels
+    if KNOWN_FEEDBACK not in channels:
+        return seen
+    force = channels["predicted_force"] - np.asarray(channels[KNOWN_FEEDBACK], float)
+    return seen.with_channels(predicted_force=force)
+
+
+def _beside_fewest(column: np.ndarray, current: Fit, evidence: Evidence) -> tuple[float, float]:
+    """The same of a servo's command, beside the fewest values that have to be others.
+
+    A servo's command follows its position, so that its lateness is nearly damping: beside all
+    values it is not known.
+    """
+    own = np.concatenate([column[:, None], current.columns], axis=1)
+    target = current.residual + current.columns @ np.concatenate(current.alphas)
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    enough = LINEARITY**2 * float(evidence.force @ evidence.force)
+    others = [i for i in fewest(own, target, block, enough) if i]
+    basis = orthonormal(own[:, others])
+    alone, left = (x - basis @ (basis.T @ x) for x in (column, target))
+    along = float(alone @ left)
+    delay = along / max(float(alone @ alone), 1e-300)
+    return delay, along * delay / max(float(left @ left), 1e-300)
+
+
 def _lateness(kernels: list[Evidence], known: Fit) -> tuple[float, float]:
     """How much earlier the force is than belongs to the same instant as the position, s, and the
     part of the energy that this explains.
@@ -221,8 +254,10 @@ def _lateness(kernels: list[Evidence], known: Fit) -> tuple[float, float]:
     def late(evidence: Evidence) -> tuple[float, float]:
         seen = with_predictions(evidence, known)
         current = fit(terms, seen, betas, 6)
-        seen = with_predictions(seen, current)
+        seen = _without_feedback(with_predictions(seen, current))
         column = seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
+        if KNOWN_FEEDBACK in seen.motion.channels:
+            return _beside_fewest(column, current, seen)
         basis = current.basis()
         column = column - basis @ (basis.T @ column)
         along = float(column @ current.residual)

@@ -6,6 +6,7 @@ better account, with what noise of the force it takes away on its own added agai
 the kernel is wide shows in no column; undoing it does.
 """
 
+import dataclasses
 import functools
 from collections.abc import Callable
 from typing import NamedTuple
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..data.recording import Recording
+from ..terms import KNOWN_FEEDBACK as FEEDBACK
 from ..terms.effect import Effect
 from ..terms.effects import EFFECTS, traits
 from .acceptance import least_gain
@@ -117,7 +119,7 @@ class _Undoing:
         pairs = zip(known.terms, known.betas, strict=True)
         self.terms, self.betas = zip(*(p for p in pairs if not traits(p[0]).late), strict=True)
         count = self.motion.recording.num_samples
-        self.noise = self.motion.forced(np.random.default_rng(0).normal(size=count))
+        self.noise = _of_commands(self.motion.forced(np.random.default_rng(0).normal(size=count)))
         self.hiss = functools.cache(self._hiss)
         narrow = self.hiss(_as_it_is, 0.0, problem.evidence.width)
         self.power = fast(known) ** 2 / narrow  # of the force's noise, in the time domain, N²
@@ -261,6 +263,15 @@ def _worth_it(undelayed: Solution, late: LateForce, base: Fit) -> Solution:
         if less.energy - current.energy < least:
             current, others = less, [t for i, t in enumerate(others) if i != number]
     return Solution(problem, selection._replace(last=current, selected=others))
+
+
+def _of_commands(motion: Motion) -> Motion:
+    """The motion without a servo's feedback: all of its force is what the command makes."""
+    logs = [
+        dataclasses.replace(log, channels={k: v for k, v in log.channels.items() if k != FEEDBACK})
+        for log in (motion.recording, motion.padded)
+    ]
+    return motion._replace(recording=logs[0], padded=logs[1])
 
 
 def _undone(motion: Motion, undo: Undo, time: float) -> Motion:

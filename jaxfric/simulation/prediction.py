@@ -15,6 +15,7 @@ from .. import programs, signals
 from ..data.excerpt import MOST, SPARE, excerpt, pieces
 from ..data.recording import Recording, pad, require, uniform
 from ..models import Model, require as require_model, weighed
+from ..terms import at_other_times
 from ..terms.actuator import PREDICTED, REACTION, carried
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
@@ -185,7 +186,8 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
     if len(motion.choices) > 1 and any(map(_stepped, summands(model.term))):
         moved = moved + _smoothing_of_loads(model, motion, driven)
     rate = _rate(moved, prepared, motion.choices[-1], motion.step)
-    return later(prepared, force(prepared) + rate + lagging, delay)
+    whole = force(prepared) + rate + lagging
+    return at_other_times(prepared, whole, lambda part: later(prepared, part, delay))
 
 
 @programs.compiled

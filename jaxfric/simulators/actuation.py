@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ..data.recording import Recording
-from ..terms import KNOWN
+from ..terms import KNOWN, KNOWN_FEEDBACK
 from .inverse import Along
 from .known import Attribute
 
@@ -141,23 +141,52 @@ def read(mujoco: Any, model: Any, joint: int) -> Actuator:
 def driven(own: Actuator, recording: Recording, seen: Along, joint: int) -> Recording:
     """The recording with the joint's force that the actuator makes of its force, the command.
 
-    The command stays as the channel `known_command`. Where the actuator still remembers what was
-    before the recording, nothing is compared.
+    The command stays as the channel `known_command`, what the actuator makes of position and
+    velocity as `known_feedback`: the command alone may be late. Where the actuator still remembers
+    what was before the recording, nothing is compared.
     """
     command = np.asarray(recording.force, float)
     time = np.asarray(recording.time, float)
     held = _held(np.clip(command, *own.control), time, own.delay)
     acting = _filtered(held, time, own.constant) if own.constant else held
-    bias = _bias(own, joint, seen)
-    force = own.gear * np.clip(own.gain * acting + bias / own.gear, *own.force)
     known = np.isfinite(command) & (time - time[0] >= own.delay + FORGOTTEN * own.constant)
+    valid = known & np.asarray(recording.mask)
+    own = min(_ways(own), key=lambda each: _left(each, acting, seen, joint, valid))
+    bias = _bias(own, joint, seen)
+    force = _made(own, acting, bias)
     kind = np.asarray(recording.time).dtype
+    state = {KNOWN_FEEDBACK: jnp.asarray(bias.astype(kind))} if any(own.bias[1:]) else {}
     return dataclasses.replace(
         recording,
         force=jnp.asarray(np.where(np.isfinite(command), force, np.nan).astype(kind)),
-        mask=jnp.asarray(np.asarray(recording.mask) & known),
-        channels=recording.channels | {COMMAND: jnp.asarray(np.nan_to_num(command).astype(kind))},
+        mask=jnp.asarray(valid),
+        channels=recording.channels
+        | {COMMAND: jnp.asarray(np.nan_to_num(command).astype(kind))}
+        | state,
     )
+
+
+def _made(own: Actuator, acting: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    return own.gear * np.clip(own.gain * acting + bias / own.gear, *own.force)
+
+
+def _ways(own: Actuator) -> list[Actuator]:
+    """The servo with the speed that the model's integrator takes, and with that of the moment.
+
+    A machine has no integrator, and a log of another simulator is of another step.
+    """
+    return [own, own._replace(ahead=0.0)] if own.ahead and own.bias[2] else [own]
+
+
+def _left(own: Actuator, acting: np.ndarray, seen: Along, joint: int, valid: np.ndarray) -> float:
+    """What the made force leaves of the needed one, N², but for a command that acts a little late.
+
+    Both to first order; `valid`: the samples that count, `(N,)`.
+    """
+    rest = (_made(own, acting, _bias(own, joint, seen)) - seen.force[:, joint])[valid]
+    slope = np.gradient(acting)[valid]
+    rest = rest - slope * float(slope @ rest) / max(float(slope @ slope), 1e-300)
+    return float(rest @ rest)
 
 
 def _held(command: np.ndarray, time: np.ndarray, delay: float) -> np.ndarray:

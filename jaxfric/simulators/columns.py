@@ -80,6 +80,11 @@ def _of_actuator(every, actuator: Actuator, joint: int, name: str):
         GAIN: (actuation.gain(actuator), lambda s: actuation.by_gain(actuator, joint, s)),
         **actuation.columns(actuator, joint, sprung),
     }
+    # A servo's speed is that of one moment or another within half an integrator's step: its damping
+    # times that much is inertia.
+    armature, parts = every[f"joint/{name}/armature"]
+    unsure = abs(actuator.gear**2 * actuator.bias[2] * actuator.ahead)
+    every = every | {f"joint/{name}/armature": (armature._replace(between=unsure), parts)}
     return {key: gained.pop(key, own) for key, own in every.items()} | gained
 
 

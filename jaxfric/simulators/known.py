@@ -36,7 +36,7 @@ class Attribute(NamedTuple):
     - `owner`: what it belongs to, "joint elbow" or "body forearm"; `what`: "damping"; `value` in
       the simulator, `unit`; `alike`: others whose force is the same at this joint but for a factor,
       in words; `rest`: where a spring's force is zero; `between`: of a time, the samples that it is
-      known from, s.
+      known from, s; of another value, an interval that it is anywhere within.
     """
 
     owner: str

@@ -68,12 +68,14 @@ from .friction import (
 from .inertia import Inertia as Inertia, Offset as Offset
 from .known import (
     KNOWN as KNOWN,
+    KNOWN_FEEDBACK as KNOWN_FEEDBACK,
     KNOWN_FORCE as KNOWN_FORCE,
     KNOWN_MOMENTUM as KNOWN_MOMENTUM,
     KNOWN_REST as KNOWN_REST,
     KnownColumns as KnownColumns,
     KnownForce as KnownForce,
     KnownGain as KnownGain,
+    at_other_times as at_other_times,
     channels_of as channels_of,
 )
 from .position import Gravity as Gravity

@@ -1,6 +1,7 @@
 """A force that another program has computed for the recorded motion."""
 
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -17,8 +18,19 @@ KNOWN_FORCE = "known_force"
 # The same in two parts, where the simulator says them: rest + d/dt momentum. Then no acceleration
 # has to be derived from the recorded motion.
 KNOWN_REST, KNOWN_MOMENTUM = "known_rest", "known_momentum"
+# The part of a recorded force, N, that a servo makes of the motion itself: not late where its
+# command is.
+KNOWN_FEEDBACK = "known_feedback"
 # Channels that begin so belong to a simulator.
 KNOWN = "known_"
+
+
+def at_other_times(
+    recording: Recording, signal: Float[Array, " N"], move: Callable[[Any], Any]
+) -> Any:
+    """A signal like the recorded force with `move` done to what is no feedback of a servo."""
+    feedback = recording.channels.get(KNOWN_FEEDBACK)
+    return move(signal) if feedback is None else move(signal - feedback) + feedback
 
 
 class KnownForce(AbstractTerm):

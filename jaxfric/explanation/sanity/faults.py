@@ -14,6 +14,7 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...simulators import Mujoco
+from ...terms import KNOWN_FEEDBACK, at_other_times
 from ..acceptance import LINEARITY
 from ..least_squares import orthonormal
 from ..mismatch import MOST_WRONG, fewest
@@ -56,8 +57,8 @@ class Faults(NamedTuple):
 
 class FaultSearch(NamedTuple):
     """Where the search ended: the faults, what can be seen of those that are none, the rows, and
-    the part of the mismatch that they and the wrong values leave. `alone`: whether one joint's force
-    has a clock of its own, beside others that are on time.
+    the part of the mismatch that they and the wrong values leave. `alone`: whether one joint's
+    force has a clock of its own, beside others that are on time.
     """
 
     faults: Faults
@@ -219,11 +220,13 @@ def put_right(recording: Recording, faults: Faults) -> Recording:
     late = faults.late + faults.drift * (time - (time[0] + time[-1]) / 2)
     there = time + late
     known = np.isfinite(force)
-    moved = np.interp(there, time[known], force[known])
+    moved = at_other_times(
+        recording, force, lambda part: np.interp(there, time[known], np.asarray(part)[known])
+    )
     inside = (there >= time[0]) & (there <= time[-1])
     mask = np.asarray(recording.mask) & inside
     kind = np.asarray(recording.force).dtype
-    return dataclasses.replace(recording, force=moved.astype(kind), mask=mask)
+    return dataclasses.replace(recording, force=np.asarray(moved).astype(kind), mask=mask)
 
 
 def _stack(parts: Sequence[Part], rows: Sequence[Rows], faults: Faults) -> Stack:
@@ -305,10 +308,12 @@ def _shift(rows: Sequence[Rows]) -> float:
         plain = known, rate(each.evidence, speed), speed, np.sign(speed), np.ones_like(speed)
         columns = [np.interp(even, at, x) for x in plain]
         force = each.weight * np.interp(even, at, np.asarray(motion.force, float))
-        pairs.append((force, orthonormal(np.stack(columns, axis=1)[inner])))
+        state = np.asarray(motion.channels.get(KNOWN_FEEDBACK, np.zeros_like(speed)), float)
+        state = each.weight * np.interp(even, at, state)
+        pairs.append((force - state, state, orthonormal(np.stack(columns, axis=1)[inner])))
 
     def left(shift: int) -> float:
-        moved = [(np.roll(force, -shift)[inner], basis) for force, basis in pairs]
+        moved = [((np.roll(f, -shift) + state)[inner], basis) for f, state, basis in pairs]
         return sum(float(force @ force - np.sum((basis.T @ force) ** 2)) for force, basis in moved)
 
     tried = {shift: left(shift) for shift in range(-most, most + 1)}

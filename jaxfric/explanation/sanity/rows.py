@@ -8,7 +8,7 @@ import numpy as np
 from ...data.recording import Recording
 from ...models import Model
 from ...simulators import AbstractSimulator
-from ...terms import KNOWN_FORCE
+from ...terms import KNOWN_FEEDBACK, KNOWN_FORCE
 from ..acceptance import LINEARITY
 from ..evidence import Evidence, gather
 from ..least_squares import RANK, orthonormal
@@ -28,7 +28,7 @@ class Part(NamedTuple):
 class Rows(NamedTuple):
     """One joint's rows of the weak form.
 
-    - `target`: recorded less known force, N, `(J,)`; `known`; `rate`: of the known force, N/s.
+    - `target`: recorded less known force, N, `(J,)`; `known`; `rate`, N/s, of what may be late.
     - `elapsed`: of each row's middle, s, from the middle of the record.
     - `own`: what the simulator's parameters add, `(J, K)`, with their `names`.
     - `weight`: one over the noise of a row, 1/N; `block`, of each row.
@@ -60,7 +60,9 @@ def rows_of(recording: Recording, model: Model) -> Rows:
     term = model.term
     own = evidence.columns(term, np.zeros((1, 0)))[0]
     force = np.asarray(evidence.motion.channels[KNOWN_FORCE], float)
-    rate = evidence.project(np.zeros_like(force), force)
+    # What a servo makes of the motion itself is never late.
+    late = force - np.asarray(evidence.motion.channels.get(KNOWN_FEEDBACK, 0.0), float)
+    rate = evidence.project(np.zeros_like(force), late)
     time = np.asarray(evidence.motion.time, float)[evidence.centre]
     elapsed = time - (time[0] + time[-1]) / 2
     known = evidence.force - evidence.target

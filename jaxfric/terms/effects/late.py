@@ -12,6 +12,7 @@ from ...units import TIME
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
 from ..effect import Effect
+from ..known import at_other_times
 from ..sample import Parameter, Sample
 from ..table import reading
 
@@ -51,12 +52,19 @@ FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quart
 def earlier(motion: Recording, delay: float) -> Recording:
     """The force taken `delay`, s, later: what acted then."""
     time, force, segment = map(np.asarray, (motion.time, motion.force, motion.segment))
-    return dataclasses.replace(motion, force=jnp.asarray(shifted(time, force, segment, -delay)))
+    moved = at_other_times(motion, force, lambda part: shifted(time, part, segment, -delay))
+    return dataclasses.replace(motion, force=jnp.asarray(moved))
 
 
 def lagged(motion: Recording, lag: float) -> Recording:
     """The force through 1/(1 + T s), exact for straight lines between the samples."""
-    time, force = np.asarray(motion.time), np.asarray(motion.force)
+    force = np.asarray(motion.force)
+    through = at_other_times(motion, force, lambda part: _through(motion, np.asarray(part), lag))
+    return dataclasses.replace(motion, force=jnp.asarray(through))
+
+
+def _through(motion: Recording, force: np.ndarray, lag: float) -> np.ndarray:
+    time = np.asarray(motion.time)
     step = np.diff(time, prepend=time[0])
     keep = np.exp(-np.clip(step, 0.0, None) / lag)
     new = np.diff(np.asarray(motion.segment), prepend=-1) != 0
@@ -68,7 +76,7 @@ def lagged(motion: Recording, lag: float) -> Recording:
             slope = (u - before) / h
             state = k * (state - before + slope * lag) + u - slope * lag
         out[i], before = state, u
-    return dataclasses.replace(motion, force=jnp.asarray(out))
+    return out
 
 
 TRANSPORT_DELAY = Effect(
