@@ -105,7 +105,8 @@ def _at_base_values(better: Improved) -> Improved:
         last = as_given(model, selection.last, problem.evidence)
         return Solution(problem, selection._replace(last=last, given=model, free=()))
 
-    return better._replace(findings=Findings(given(recorded), given(undelayed)))
+    findings = Findings(given(recorded), given(undelayed))
+    return better._replace(findings=findings, refitted=False)
 
 
 def _without_nil(better: Improved) -> Improved:
