@@ -9,11 +9,12 @@ import numpy as np
 from ..models import Model
 from ..simulation.errors import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
-from . import verification
+from . import parameters as spelled, verification
 from .figures import Figures
 from .findings import Findings
 from .problem import LEAST_SHARE
 from .regression import Fit
+from .uncertainty import estimated
 
 # A figure that is larger by less than a hundredth of itself, and not more than by chance, is not
 # worse: Student's t of 15 degrees of freedom is below 2.13 in 97.5 % of the cases.
@@ -84,6 +85,7 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
         # Beside values as given, what only refitted values had called for removes nothing.
         while (less := _without_idle(findings)) is not None:
             findings = less
+    findings = _without_unsure(findings)
     claimed, base = findings, findings.at_base(first)
     refitted = first is not findings.selection.base
     spoilt = None
@@ -127,6 +129,24 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
         [selected.effect.name for selected in some.selection.selected] for some in (before, after)
     )
     return tuple(dict.fromkeys(n for n in names if names.count(n) > others.count(n)))
+
+
+def _without_unsure(findings: Findings) -> Findings:
+    """Without changes at a moment whose size may as well be none once the moment is uncertain.
+
+    What they are told by is the value before and after: an interval that holds both says nothing.
+    """
+    while True:
+        selected = findings.selection.selected
+        dated = [n for n, each in enumerate(selected) if each.effect.moment]
+        if not dated:
+            return findings
+        values = estimated(findings)[findings.selection.term_index(0) :]
+        terms = findings.selection.last.terms[findings.selection.term_index(0) :]
+        unsure = [n for n in dated if spelled.may_be_none(terms[n], values[n])]
+        if not unsure:
+            return findings
+        findings = findings.without(unsure[-1])
 
 
 def _without_idle(findings: Findings) -> Findings | None:

@@ -1,6 +1,7 @@
 """What an explanation says of a simulator, written into the simulator's own file."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,6 +22,8 @@ from ..terms.base import Sum, summands
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
+from .held import kept
+from .parts import Part
 from .rerun import Rerun, rerun
 
 
@@ -90,6 +93,13 @@ def patch(
             elif key != CONSTANT:
                 before, _ = values.get(key, (float(moved.before), 0.0))
                 values[key] = before, float(moved.value)
+    compared = _Compared(source, found, recordings)
+    owners = list(dict.fromkeys(map(_owner, values)))
+    good = kept(owners, lambda some: compared.held(_of(values, some))) if owners else []
+    left += [
+        f"{key} → {to:.5g}: {WORSE}" for key, (_, to) in values.items() if _owner(key) not in good
+    ]
+    values = _of(values, good)
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
     written = [f"{key}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written]
     left += [f"{key} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
@@ -100,8 +110,10 @@ def patch(
         left += [
             f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
         ]
-        if able:
-            models[joint] = callback.only(model, able)
+        good = kept(able, lambda some, j=joint, m=model: compared.beside(done.text, j, m, some))
+        left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]
+        if good:
+            models[joint] = callback.only(model, good)
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
@@ -109,17 +121,51 @@ def patch(
         f"{module}: joint {joint}: {', '.join(p.name for p in callback.parts(model))}"
         for joint, model in models.items()
     ]
-    errors = {}
-    shared: dict[bytes, Any] = {}
-    for joint, told in found.items():
-        commanded = _commanded(recordings[joint][0])
-        pair = (
-            Mujoco(source, joint, shared=shared, commanded=commanded),
-            Mujoco(done.text, joint, folder_of(source), shared, commanded=commanded),
-        )
-        errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
+    errors = {joint: compared.errors(done.text, joint, models.get(joint)) for joint in found}
     patch = Patch(done.text, forces, written, left, errors, module)
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+# Why something is not written.
+WORSE = "the held-out recording is worse with it"
+
+
+def _owner(key: str) -> str:
+    """What a value belongs to: those of one joint, actuator or body are written together."""
+    return key.rpartition("/")[0]
+
+
+def _of(values: Mapping[str, tuple[float, float]], owners: Sequence[str]):
+    return {key: pair for key, pair in values.items() if _owner(key) in owners}
+
+
+class _Compared:
+    """The force errors of a model's text, by the explanations and recordings of its joints."""
+
+    def __init__(self, source: str | Path, found: Mapping[str, Explanation], recordings):
+        self.source, self.found, self.recordings = source, found, recordings
+        self.shared: dict[bytes, Any] = {}
+
+    def errors(self, text: str, joint: str, forces: Model | None = None, first: int = 0):
+        """Of one joint, by recording from the `first` on."""
+        logs = self.recordings[joint]
+        commanded = _commanded(logs[0])
+        before = Mujoco(self.source, joint, shared=self.shared, commanded=commanded)
+        after = Mujoco(text, joint, folder_of(self.source), self.shared, commanded=commanded)
+        return _errors(self.found[joint], before, after, logs, forces, first)
+
+    def held(self, values: Mapping[str, tuple[float, float]]) -> list[float]:
+        """Of all joints on their held-out recordings, with some values in the file."""
+        text = patched(library(), self.source, {k: to for k, (_, to) in values.items()}).text
+        held = [joint for joint in self.found if len(self.recordings[joint]) > 1]
+        return [self.errors(text, joint, None, 1)[HELD]["file"] for joint in held]
+
+    def beside(self, text: str, joint: str, model: Model, some: Sequence[Part]) -> list[float]:
+        """Of one joint on its held-out recording, with some forces beside the file."""
+        if len(self.recordings[joint]) < 2:
+            return []
+        forces = callback.only(model, some) if some else None
+        return [self.errors(text, joint, forces, 1)[HELD]["forces" if some else "file"]]
 
 
 def _commanded(recording: Recording) -> bool:
@@ -223,11 +269,18 @@ def _speed(recording: Recording) -> float:
     return float(np.quantile(moved / np.diff(np.asarray(recording.time, float)), 0.98))
 
 
-def _errors(told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None):
+# The figures by recording.
+HELD = "holdout_force_error"
+FIGURES = ("force_error", HELD)
+
+
+def _errors(
+    told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None, first: int
+):
     """The force errors through the kernel: before, of the file, and with the forces beside it."""
     delay = told.fit["filtered_force_error"]["force_taken_later"]
     found = {}
-    for name, log in zip(("force_error", "holdout_force_error"), recordings, strict=False):
+    for name, log in list(zip(FIGURES, recordings, strict=False))[first:]:
         made = _made(before, after, log)
         error = {
             "before": through_kernel(before.baseline(log.units), before.beside(log), delay),

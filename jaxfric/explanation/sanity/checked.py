@@ -90,7 +90,7 @@ def check_logs(parts: Sequence[Part]) -> list[CheckedSimulator]:
         parts = [_apart(*each) for each in zip(parts, blocked, strict=True)]
         raw = [_rows(part) for part in parts]
         wired = wiring.wiring_of(parts, raw)
-        bounds = [_limit(part) for part in parts]
+        bounds = [_limit(*each) for each in zip(parts, raw, strict=True)]
         clipped = [_arrived(part, bound) for part, bound in zip(parts, bounds, strict=True)]
         able = not wired.said or not wired.everywhere
         seen = find_each(clipped) if able else [FaultSearch(Faults(), {}, (), [r]) for r in raw]
@@ -133,8 +133,12 @@ def _rows(part: Part) -> Rows:
     return rows_of(log, part.simulator.baseline(log.units))
 
 
-def _limit(part: Part) -> Estimate | None:
-    return limits.hard_limit(part.simulator.beside(part.recording))
+def _limit(part: Part, raw: Rows) -> Estimate | None:
+    """The limit of the force, where what arrived is nearer to what the motion needed."""
+    bound = limits.hard_limit(part.simulator.beside(part.recording))
+    if bound is None or limits.noisy(part.recording, bound):
+        return None
+    return bound if _rows(_arrived(part, bound)).power < raw.power else None
 
 
 def _arrived(part: Part, bound: Estimate | None) -> Part:

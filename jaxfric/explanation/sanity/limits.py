@@ -4,8 +4,10 @@ import dataclasses
 
 import numpy as np
 
+from ... import signals
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
+from ...signals.noise import host_white_noise
 from ...simulation.errors import in_motion
 from ...simulation.prediction import Prepared
 from ...terms import KNOWN_FORCE
@@ -86,6 +88,21 @@ def arrived(recording: Recording, limit: Estimate | None) -> Recording:
     top = float(limit.value)
     force = np.clip(np.asarray(recording.force), -top, top)
     return dataclasses.replace(recording, force=force)
+
+
+def noisy(recording: Recording, limit: Estimate) -> bool:
+    """Whether the noise of the recorded force alone reaches as far beyond a limit.
+
+    Of a force that is flat, as dry friction is, noise of any size asks for more at half of the
+    samples, by its own root mean square; of twice that a fourth of the power is noise.
+    """
+    force = np.asarray(recording.force, float)
+    valid = np.asarray(recording.mask) & np.isfinite(force)
+    excess = np.abs(force[valid]) - float(limit.value)
+    excess = excess[excess > 0]
+    together = signals.host_continuous(recording, signals.host_interval(recording))
+    noise = host_white_noise(np.where(np.isfinite(force), force, 0.0), together)
+    return bool(np.sum(excess**2) < (2 * noise) ** 2 * len(excess))
 
 
 def beyond(recording: Recording, limit: Estimate) -> int:
