@@ -118,7 +118,7 @@ def _explain(
         known = rephased(known, problem.evidence)
     remarks = [*inputs.remarks, *_contradictions(problem)]
     if any(remark.severe for remark in remarks):
-        wrong, better = _judged(known, nothing(problem), inputs, doing, seed)
+        wrong, better = _unjudged(known, nothing(problem), inputs, doing, seed)
     else:
         wrong, better = _found(known, motion, problem, inputs, seed, doing)
     if held is not None:
@@ -175,6 +175,17 @@ def _with_dropped(better: Improved, rounds: list[Improved]) -> Improved:
     names = dict.fromkeys(name for each in rounds for name in each.dropped)
     dropped = tuple(name for name in names if name not in better.findings.selection.names)
     return better._replace(dropped=dropped, spoilt=rounds[0].spoilt if dropped else None)
+
+
+def _unjudged(
+    known: Baseline, none: Findings, inputs: Inputs, doing: Callable[[str], None], seed: int
+) -> tuple[Mismatch | None, Improved]:
+    """Nothing found. Of a simulator no value is tested either: beside what is certain to be wrong
+    with its log each would only make up for that.
+    """
+    if inputs.attributes:
+        return None, _improved(known, none, None, inputs)
+    return _judged(known, none, inputs, doing, seed)
 
 
 def _judged(

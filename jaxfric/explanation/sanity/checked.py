@@ -92,8 +92,12 @@ def check_logs(parts: Sequence[Part]) -> list[CheckedSimulator]:
         wired = wiring.wiring_of(parts, raw)
         bounds = [_limit(*each) for each in zip(parts, raw, strict=True)]
         clipped = [_arrived(part, bound) for part, bound in zip(parts, bounds, strict=True)]
-        able = not wired.said or not wired.everywhere
-        seen = find_each(clipped) if able else [FaultSearch(Faults(), {}, (), [r]) for r in raw]
+        sound = [part for part in clipped if wired.sound(part.name)]
+        able = {p.name: own for p, own in zip(sound, find_each(sound), strict=True)}
+        seen = [
+            able.get(part.name, FaultSearch(Faults(), {}, (), [own]))
+            for part, own in zip(parts, raw, strict=True)
+        ]
         ends = zip(bounds, blocked, strict=True)
         return [
             _corrected(*each, wired) for each in zip(parts, clipped, raw, seen, ends, strict=True)

@@ -75,6 +75,8 @@ def find_each(parts: Sequence[Part]) -> list[FaultSearch]:
     Among joints that are on time one that is late is a small part of the mismatch, and other
     joints' values imitate it: each joint is asked about its clock by itself too.
     """
+    if not parts:
+        return []
     seen = find(parts)
     if not seen.faults.clock and len(parts) > 1:
         own = [find([part]).faults for part in parts]

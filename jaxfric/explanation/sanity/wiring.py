@@ -1,11 +1,12 @@
 """Columns that belong to another joint, or count the other way: known by the force they leave."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from ...simulators import Mujoco
+from ...simulators.loading import is_hinge
 from .faults import MOMENTS
 from .rows import Part, Rows, nodes
 
@@ -22,6 +23,10 @@ class Wiring(NamedTuple):
     said: dict[str, str]
     everywhere: bool = True
 
+    def sound(self, joint: str) -> bool:
+        """Whether a joint can be compared."""
+        return not self.said or (not self.everywhere and joint not in self.said)
+
 
 def wiring_of(parts: Sequence[Part], rows: Sequence[Rows]) -> Wiring:
     """Whether forces are repeated or swapped, positions swapped or counted the other way."""
@@ -31,10 +36,13 @@ def wiring_of(parts: Sequence[Part], rows: Sequence[Rows]) -> Wiring:
         # The one that it belongs to is as good as it was.
         others = {part.name for i, part in enumerate(parts) if i in bad}
         return Wiring({n: text for n, text in said.items() if n in others} or said, False)
-    if not bad or not all(isinstance(part.simulator, Mujoco) for part in parts):
+    # Where joints are alike, another's force describes this one's, but for its size.
+    off = bad or any(own.power > WRONG for own in rows)
+    if not off or not all(isinstance(part.simulator, Mujoco) for part in parts):
         return Wiring({})
-    said = _swapped(parts, rows)
-    return Wiring(said or _positions(parts, rows))
+    said = _swapped(parts, rows) if bad else {}
+    # Forces are each joint's own; a position is in the forces of all.
+    return Wiring(said, False) if said else Wiring(_positions(parts, rows))
 
 
 def _repeated(parts: Sequence[Part]) -> dict[str, str]:
@@ -87,9 +95,30 @@ def _other(own: Rows, other: Rows) -> np.ndarray:
     return own.evidence.project(np.interp(nodes(own), nodes(other), values))
 
 
+class Change(NamedTuple):
+    """One thing that may be wrong with the columns of some joints.
+
+    Their order the other way round, of the positions or of the `forces` too; or positions that are
+    to be taken times a `factor`, of a `unit`.
+    """
+
+    names: tuple[str, ...]
+    factor: float = 1.0
+    unit: str = ""
+    forces: bool = False
+
+    def order(self, number: Mapping[str, int]) -> list[int]:
+        """Whose column each joint's is, by number."""
+        order = list(range(len(number)))
+        if self.factor == 1.0:
+            for one, two in zip(self.names, reversed(self.names), strict=True):
+                order[number[one]] = number[two]
+        return order
+
+
 def _positions(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
-    """Positions that count the other way, or stand for each other's: one change that puts all
-    joints right.
+    """Positions that count the other way or in another unit, or columns that stand for each
+    other's: one change that puts all joints right.
     """
     simulator = parts[0].simulator
     assert isinstance(simulator, Mujoco)
@@ -98,42 +127,59 @@ def _positions(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
     number = {name: i for i, name in enumerate(simulator.joints)}
     before = float(np.mean([_left(own, own.known) for own in rows]))
     tried = {}
-    for names, sign in _changes(simulator.joints):
-        order = list(range(len(number)))
-        for one, two in zip(names, reversed(names), strict=True):
-            order[number[one]] = number[two]
-        signs = np.ones(len(number))
-        if sign < 0:
-            signs[number[names[0]]] = -1
+    for change in _changes(simulator):
+        order, signs = change.order(number), np.ones(len(number))
+        signs[[number[name] for name in change.names]] = change.factor
         force = simulator.turned(parts[0].recording, order, signs, index)
+        if change.forces:
+            force = force[:, order]
         left = [
             _left(own, own.evidence.project(np.interp(nodes(own), time[index], values)))
             for part, own in zip(parts, rows, strict=True)
             for values in (force[:, number[part.name]],)
         ]
         if max(left) < RIGHT:
-            tried[names, sign] = float(np.mean(left))
+            tried[change] = float(np.mean(left))
     best = min(tried, key=lambda change: tried[change], default=None)
-    return _told(*best) if best is not None and tried[best] < 0.5 * before else {}
+    return _told(best) if best is not None and tried[best] < 0.5 * before else {}
 
 
-def _changes(joints: Sequence[str]):
-    for name in joints:
-        yield (name,), -1.0
-    for i, one in enumerate(joints):
-        for two in joints[i + 1 :]:
-            yield (one, two), 1.0
+# What logs count positions in, in the model's unit.
+ANGLES = {"degrees": np.pi / 180, "revolutions": 2 * np.pi, "mrad": 1e-3}
+LENGTHS = {"mm": 1e-3}
 
 
-def _told(names: tuple[str, ...], sign: float) -> dict[str, str]:
-    if sign < 0:
+def _changes(simulator: Mujoco) -> Iterator[Change]:
+    joints = simulator.joints
+    swaps = [(one, two) for i, one in enumerate(joints) for two in joints[i + 1 :]]
+    # Joints that are counted from the other end.
+    swaps += [tuple(joints)] if len(joints) > 2 else []
+    yield from (Change((name,), -1.0) for name in joints)
+    yield from (Change(names, forces=forces) for names in swaps for forces in (False, True))
+    hinges = [is_hinge(simulator.mujoco, simulator.model, i) for i in range(len(joints))]
+    for units, turns in ((ANGLES, True), (LENGTHS, False)):
+        names = tuple(name for name, hinge in zip(joints, hinges, strict=True) if hinge == turns)
+        yield from (Change(names, factor, unit) for unit, factor in units.items() if names)
+
+
+def _told(change: Change) -> dict[str, str]:
+    names = change.names
+    every = ", ".join(names)
+    if change.unit:
         text = (
-            f"The position of joint {names[0]} counts the other way than the simulator's. Turn it "
+            f"The positions ({every}) are in {change.unit}: with {change.factor:.6g} of them the "
+            f"simulator describes the force. Give --scale position={change.factor:.6g}, which is "
+            "of all joints."
+        )
+    elif change.factor < 0:
+        text = (
+            f"The position of joint {every} counts the other way than the simulator's. Turn it "
             "round in the log, or the joint's axis in the model."
         )
-        return {names[0]: text}
-    text = (
-        f"The positions of the joints {names[0]} and {names[1]} are swapped. Name them: --columns "
-        f"{names[0]}_position=NAME,{names[1]}_position=NAME."
-    )
+    else:
+        what = "columns" if change.forces else "positions"
+        roles = ("position", "force") if change.forces else ("position",)
+        named = ",".join(f"{name}_{role}=NAME" for name in names for role in roles)
+        how = "swapped" if len(names) == 2 else "in the reverse order"
+        text = f"The {what} of the joints {every} are {how}. Name them: --columns {named}."
     return dict.fromkeys(names, text)
