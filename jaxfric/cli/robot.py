@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..data.io import read_with_notes
-from ..data.joints import COMMAND, columns_of, references_of
+from ..data.joints import COMMAND, references_of
 from ..data.provenance import sha256
 from ..data.recording import Recording
 from ..data.tables import load
 from ..data.targets import standard
 from ..explanation import Explanation, explain
-from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs
+from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs, rows_of
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -24,7 +24,9 @@ from ..simulators import Mujoco
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..simulators.patching import folder_of, patched
 from ..terms.effects.parameter_mismatch import MISMATCH
+from . import joint_columns
 from .commands import put, read, today, working
+from .joint_columns import Logged
 from .messages import message, say
 from .saving import saved
 
@@ -45,6 +47,7 @@ class Joint(NamedTuple):
     reference: np.ndarray | None = None
     commanded: Recording | None = None
     corrected: tuple[str, ...] = ()
+    still: tuple[str, ...] = ()
 
 
 def run(arguments: Namespace) -> int:
@@ -76,21 +79,9 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     """The joints of the log, those farther out first: what is wrong of a body is put right before
     the joints that carry it are judged.
     """
-    logs = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
-    columns = [_columns(path, joints, arguments) for path in logs]
-    whole = [
-        j for j in joints if all({"force", COMMAND} & each.get(j, {}).keys() for each in columns)
-    ]
-    chosen = [arguments.joint] if arguments.joint else whole
-    if not whole and (len(joints) == 1 or arguments.joint):
-        chosen = [arguments.joint or joints[0]]
-        columns = [{} for _ in columns]
-    elif not set(chosen) & set(whole):
-        raise ValueError(
-            f"{arguments.file}: no joint of the model has a position and a force in this log. The "
-            f"joints are {', '.join(joints)}. Name the columns: --columns "
-            f"{joints[0]}_position=NAME,{joints[0]}_force=NAME."
-        )
+    paths = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
+    logged = joint_columns.logged(arguments, joints)
+    joint_columns.check_save(arguments.save, logged.chosen)
     source: str | Path = arguments.mujoco
     found: list[Joint] = []
     corrected: tuple[str, ...] = ()
@@ -99,10 +90,11 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     with working(f"explaining {arguments.file}") as doing:
         doing("signs, zeros, clocks and limits of all joints")
         opened = {
-            name: _opened(name, shared, logs, columns, arguments, hinges[name]) for name in chosen
+            name: _opened(name, shared, paths, logged, arguments, hinges[name])
+            for name in logged.chosen
         }
         checked = _checked(opened)
-        for name in reversed(chosen):
+        for name in reversed(logged.chosen):
             doing(f"joint {name}")
             one = _joint(opened[name], checked.get(name), source, shared, arguments)
             said = [
@@ -114,22 +106,23 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
                 source = changed.text
                 said = [f"{key} at {bodies[key]:.5g}" for key in changed.written]
                 corrected = (*corrected, *said)
-    return found
+    without = [Joint(name, None, why, [], None, []) for name, why in logged.without.items()]
+    return [*found, *without]
 
 
-def _columns(path: str, joints: list[str], arguments: Namespace) -> dict[str, dict[str, str]]:
-    return columns_of(load(Path(path)).columns, joints, arguments.columns, path)
-
-
-def _opened(name: str, shared, paths, columns, arguments: Namespace, hinge: bool) -> Joint:
+def _opened(
+    name: str, shared, paths: Sequence[str], logged: Logged, arguments: Namespace, hinge: bool
+) -> Joint:
     """One joint's recordings and simulator, not explained yet."""
     logs, notes = list[Recording](), list[str]()
     reference: np.ndarray | None = None
     try:
-        commanded = COMMAND in columns[0].get(name, arguments.columns)
+        commanded = COMMAND in logged.columns[0].get(name, arguments.columns)
         simulator = Mujoco(arguments.mujoco, name, shared=shared, commanded=commanded)
-        for path, own in zip(paths, columns, strict=True):
+        still = simulator.references(logged.still)
+        for path, own in zip(paths, logged.columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)
+            log = dataclasses.replace(log, channels=log.channels | _held(still, log))
             log = simulator.driven(log) if commanded else log
             channels = dict(log.channels)
             wanted = channels.pop("reference", None)
@@ -137,10 +130,23 @@ def _opened(name: str, shared, paths, columns, arguments: Namespace, hinge: bool
                 reference = np.asarray(wanted, float)
             logs.append(dataclasses.replace(log, channels=channels))
             notes += more
-        notes += simulator.standing
+        notes += [*simulator.standing, *map(_still, still)]
     except ValueError as error:
         return Joint(name, None, _refusal(error, paths), logs, None, notes)
-    return Joint(name, None, "", logs, simulator, notes, reference, logs[0])
+    stand = tuple(map(_still, still))
+    return Joint(name, None, "", logs, simulator, notes, reference, logs[0], still=stand)
+
+
+def _held(places: Mapping[str, float], log: Recording) -> dict[str, np.ndarray]:
+    """Positions of joints that stand."""
+    return {name: np.full(log.num_samples, place) for name, place in places.items()}
+
+
+def _still(name: str) -> str:
+    return (
+        f"The joint {name} is not in the log: it is taken to stand at its reference. If it moved, "
+        f"name its column: --columns {name}_position=NAME."
+    )
 
 
 def _refusal(error: ValueError, paths: Sequence[str]) -> str:
@@ -163,7 +169,20 @@ def _checked(opened: Mapping[str, Joint]) -> dict[str, CheckedSimulator]:
     try:
         return {part.name: own for part, own in zip(parts, check_logs(parts), strict=True)}
     except ValueError:  # a joint that does not move is told of by itself
-        return {}
+        others = {name: joint for name, joint in opened.items() if not _moves(joint)}
+        return _checked({k: v for k, v in opened.items() if k not in others}) if others else {}
+
+
+def _moves(joint: Joint) -> bool:
+    """Whether a joint slips long enough to be compared."""
+    if joint.simulator is None:
+        return False
+    log = joint.logs[0]
+    try:
+        rows_of(joint.simulator.beside(log), joint.simulator.baseline(log.units))
+    except ValueError:
+        return False
+    return True
 
 
 def _of_others(name: str, checked: Mapping[str, CheckedSimulator]) -> list[Check]:
@@ -287,6 +306,7 @@ def _row(joint: Joint) -> dict[str, Any]:
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
+        "still": list(joint.still),
     }
 
 
@@ -314,11 +334,7 @@ def _written(arguments: Namespace, found: list[Joint], done: Patch | None) -> di
             texts[str(Path(arguments.save).with_name(done.module))] = done.forces
     elif arguments.save:
         told = found[0].told
-        if len(found) > 1 or told is None:
-            raise ValueError(
-                f"--save {arguments.save}: several joints are no one model. Save the simulator's "
-                "file (--save robot.xml), or one joint (--joint NAME)."
-            )
+        assert told is not None  # a single joint without an answer is an error
         texts[arguments.save] = documents.to_json(documents.saved(told.model, *found[0].logs))
     return texts
 

@@ -60,6 +60,36 @@ def columns_of(
     return {joint: roles for joint, roles in picked.items() if "position" in roles}
 
 
+def unknown(given: Mapping[str, str], joints: Sequence[str], roles: Sequence[str]) -> str | None:
+    """The first name that the user gives a column to and that is no joint, nor a joint's role, nor
+    one of the `roles`.
+    """
+    known = (*joints, *roles, *(f"{j}_{r}" for j in joints for r in (*ROLES, COMMAND, "reference")))
+    spelt = zip(given, _spelt(given, joints), strict=True)
+    return next((key for key, name in spelt if name not in known and key not in known), None)
+
+
+def mentioned(columns: Iterable[str], joints: Sequence[str]) -> set[str]:
+    """The joints that any column is of, by its name."""
+    return {joint for name in columns for joint, _ in _named(name, joints)}
+
+
+def unclaimed(columns: Iterable[str], found: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """Columns of a position that are no joint's."""
+    taken = {name for roles in found.values() for name in roles.values()}
+    return [name for name in columns if name not in taken and _part(name, "position")]
+
+
+def _part(name: str, role: str) -> tuple[str, ...] | None:
+    """What a column's name says beside a role that begins or ends it; `None` without the role."""
+    words = _words(name)
+    for at in range(1, len(words)):
+        for own, rest in ((words[at:], words[:at]), (words[:at], words[at:])):
+            if _role(own) == role:
+                return tuple(rest)
+    return None
+
+
 def references_of(
     columns: Iterable[str], joints: Sequence[str], given: Mapping[str, str]
 ) -> dict[str, str]:
@@ -147,6 +177,10 @@ def _given(joint, given, names, numbered, source: str) -> dict[str, str]:
             )
         found[role] = given[key]
     if "position" in found and "force" not in found:
+        own = _part(found["position"], "position")
+        forces = [name for name in names if own and _part(name, "force") == own]
+        if len(forces) == 1:
+            found["force"] = forces[0]
         places = [
             n for n, name in numbered.get("position", {}).items() if name == found["position"]
         ]

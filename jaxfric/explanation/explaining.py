@@ -22,7 +22,7 @@ from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
 from .holdout import check_signals, confirmed
-from .improvement import Improved, improved
+from .improvement import Improved, improved, without_unsure
 from .inputs import Inputs, prepare
 from .mismatch import Mismatch, mismatch
 from .motion import Motion, motion_of
@@ -232,4 +232,4 @@ def _improved(
         for problem in (findings.problem, findings.undelayed.problem):
             for candidates in problem.candidate_sets:
                 candidates.forget()
-    return improved(first, findings, inputs.figures)
+    return improved(first, without_unsure(findings), inputs.figures)

@@ -85,7 +85,6 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
         # Beside values as given, what only refitted values had called for removes nothing.
         while (less := _without_idle(findings)) is not None:
             findings = less
-    findings = _without_unsure(findings)
     claimed, base = findings, findings.at_base(first)
     refitted = first is not findings.selection.base
     spoilt = None
@@ -131,7 +130,7 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n for n in names if names.count(n) > others.count(n)))
 
 
-def _without_unsure(findings: Findings) -> Findings:
+def without_unsure(findings: Findings) -> Findings:
     """Without changes at a moment whose size may as well be none once the moment is uncertain.
 
     What they are told by is the value before and after: an interval that holds both says nothing.

@@ -322,6 +322,8 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):
             lines += ["", *wrapped(f"{row['joint']}: {each}")]
+    for each in dict.fromkeys(note for row in rows for note in row.get("still", ())):
+        lines += ["", *wrapped(each)]
     lines += ["", "Force errors through the kernel by which effects are looked for."]
     return "\n".join(lines)
 

@@ -126,6 +126,12 @@ class Mujoco(AbstractSimulator):
         gone = self._sticks(seen) | self.limited(recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
+        if gone.all():
+            raise ValueError(
+                f"{recording.source or 'The recording'}: the joint {self.joint} stands, or is at a "
+                "limit of the model, in all samples, so that nothing can be compared. Is it the "
+                "column of a joint that moved?"
+            )
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
         return np.where(gone, np.nan, seen.force[:, own]), sound
 
@@ -188,6 +194,10 @@ class Mujoco(AbstractSimulator):
         motion = self.along(recording).motion
         at = inverse.Motion(*(signs * part[index][:, list(order)] for part in motion))
         return inverse.forces(self.mujoco, self.model, at)
+
+    def references(self, joints: Sequence[str]) -> dict[str, float]:
+        """Where some joints stand by the model itself, rad or m."""
+        return {name: float(self.model.qpos0[self.joints.index(name)]) for name in joints}
 
     def with_zeros(self, zeros: Mapping[str, float]) -> "Mujoco":
         """The same simulator with other zeros of the joints' encoders: their attribute `ref`."""

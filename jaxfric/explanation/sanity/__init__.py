@@ -13,4 +13,5 @@ from .checked import (
     with_checks as with_checks,
 )
 from .limits import arrived as arrived
+from .rows import rows_of as rows_of
 from .table import Check as Check

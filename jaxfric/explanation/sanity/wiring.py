@@ -164,7 +164,7 @@ def _changes(simulator: Mujoco) -> Iterator[Change]:
 
 def _told(change: Change) -> dict[str, str]:
     names = change.names
-    every = ", ".join(names)
+    every = ", ".join(names[:-1]) + " and " * (len(names) > 1) + names[-1]
     if change.unit:
         text = (
             f"The positions ({every}) are in {change.unit}: with {change.factor:.6g} of them the "
