@@ -10,9 +10,10 @@ from jaxfric import cli
 from jaxfric.explanation import attributes
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.simulators import Mujoco, closed
+from jaxfric.simulators import Mujoco, actuation, closed
 from jaxfric.simulators.inverse import Motion
 from jaxfric.simulators.patching import patched
+from jaxfric.terms.effects import EFFECTS
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -43,8 +44,10 @@ def goal(t, phase):
     return np.sin(angle) @ sizes, np.cos(angle) @ (rates * sizes)
 
 
-def run(text, seconds=2.0, phase=0.0, own=False):
-    """Time, position, command, reference and joint's force of a closed loop over the actuator."""
+def run(text, seconds=2.0, phase=0.0, own=False, held=1):
+    """Time, position, command, reference and joint's force of a closed loop over the actuator,
+    whose command is new at every few steps.
+    """
     plant = mujoco.MjModel.from_xml_string(text)
     data, rows = mujoco.MjData(plant), []
     data.qpos[0], data.qvel[0] = goal(0.0, phase)
@@ -53,7 +56,8 @@ def run(text, seconds=2.0, phase=0.0, own=False):
         place, speed = goal(t, phase)
         mujoco.mj_step1(plant, data)
         wanted = 20 * (place - data.qpos[0]) + 1.5 * (speed - data.qvel[0]) + data.qfrc_bias[0] / 2
-        data.ctrl[0] = place if own else wanted
+        if k % held == 0:
+            data.ctrl[0] = place if own else wanted
         if not k and plant.na:
             data.act[0] = data.ctrl[0]
         before, start = (t, data.qpos[0], data.ctrl[0], place), data.qvel[0]
@@ -189,6 +193,45 @@ def test_a_constant_force_without_an_attribute_says_what_it_may_be():
     finding = Finding("parameter_mismatch", "", "", (), "", moved, 0.9, None, 0.002)
     said = attributes._reworded(finding, own)
     assert attributes.MAY_BE in said.sentence and said.attribute is None
+
+
+def test_of_a_servo_the_command_alone_may_be_late():
+    text = servo()
+    recording = log(run(text, own=True))
+    made = Mujoco(text, "hip", commanded=True).driven(recording)
+    feedback = np.asarray(made.channels["known_feedback"], float)
+    command = np.asarray(made.force, float) - feedback
+    later = EFFECTS["transport_delay"].undone(made, 0.004)
+    expected = feedback + np.interp(made.time - 0.004, made.time, command)
+    np.testing.assert_allclose(later.force, expected, atol=1e-3 * np.std(command))
+    # A motor makes nothing of the motion, so that all of its force is the command's.
+    plain = Mujoco(motor(), "hip", commanded=True).driven(log(run(motor())))
+    assert "known_feedback" not in plain.channels
+
+
+def test_a_servo_takes_the_speed_that_the_log_shows():
+    """That of the model's integrator where the log is its own; of a finer step that of the time."""
+    fine = servo().replace('timestep="0.001"', 'timestep="0.0001"')
+    for text, every, ahead in ((servo(), 1, 5e-4), (fine, 10, 0.0)):
+        ran = np.array(run(text, own=True))[:, ::every]
+        simulator = Mujoco(servo(), "hip", commanded=True)
+        recording = log(ran)
+        seen = simulator.along(recording)
+        found = actuation._timely(simulator.actuator, recording, ran[2], seen, 0)
+        assert found.ahead == ahead
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("held", [1, 2])
+def test_a_servo_whose_command_is_held_has_nothing_wrong(held):
+    ran, other = (
+        np.array(run(servo(300, 18), 12.0, phase, own=True, held=held))[:, ::2]
+        for phase in (0.0, 1.0)
+    )
+    simulator = Mujoco(servo(300, 18), "hip", commanded=True)
+    logs = [simulator.driven(log(each)) for each in (ran, other)]
+    found = jf.explain(logs[0], simulator, logs[1])
+    assert found.findings == [] and found.fit["filtered_force_error"]["after"] < 0.01
 
 
 @pytest.mark.slow

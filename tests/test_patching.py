@@ -3,14 +3,18 @@
 import difflib
 import json
 import math
+from argparse import Namespace
 
 import numpy as np
 import pytest
 
 from jaxfric import models, terms
+from jaxfric.cli import main
+from jaxfric.cli.joint_columns import logged
 from jaxfric.data.joints import columns_of
 from jaxfric.data.tables import load
 from jaxfric.export.callback import callback
+from jaxfric.export.held import kept
 from jaxfric.simulators import Mujoco
 from jaxfric.simulators.patching import patched
 
@@ -161,6 +165,75 @@ def test_columns_of_joints_that_are_said():
         columns_of(names, ["shoulder", "elbow"], {"shoulder": "q9"}, "log")
     with pytest.raises(ValueError, match=r"elbow_force=elbow_effort"):
         columns_of(["elbow_pos", "elbow_effort", "elbow_torque"], ["elbow"], {}, "log")
+
+
+def test_the_force_of_a_position_that_is_said_is_the_column_beside_it():
+    names = ["t", "hip_position", "hip_torque", "link2_position", "link2_torque"]
+    found = columns_of(names, ["hip", "knee"], {"knee": "link2_position"}, "log")
+    assert found["knee"] == {"position": "link2_position", "force": "link2_torque"}
+
+
+TWO = """<mujoco><worldbody><body name="upper"><joint name="hip" axis="0 1 0"/>
+<geom size="0.1" mass="1"/><body name="fore" pos="0.3 0 0"><joint name="knee" axis="0 1 0"
+ ref="20"/><geom size="0.05" mass="0.5"/></body></body></worldbody></mujoco>"""
+
+
+def named(tmp_path, header, held="", columns=(), save=None, joint=None):
+    """What is said of files with these columns."""
+    paths = []
+    for number, names in enumerate(filter(None, (header, held))):
+        paths.append(tmp_path / f"log{number}.csv")
+        rows = np.random.default_rng(number).normal(size=(20, len(names.split(","))))
+        np.savetxt(paths[-1], rows, delimiter=",", header=names, comments="")
+    files = [str(path) for path in paths] + [None]
+    return Namespace(file=files[0], holdout=files[1], columns=dict(columns), save=save, joint=joint)
+
+
+WHOLE = "time,hip_position,hip_torque,knee_position,knee_torque"
+
+
+def test_a_joint_without_a_force_is_told_and_one_that_no_log_knows_stands(tmp_path):
+    found = logged(named(tmp_path, "time,hip_position,hip_torque,knee_position"), ["hip", "knee"])
+    assert found.chosen == ["hip"] and found.still == []
+    assert "log0.csv: there is no force of the joint knee" in found.without["knee"]
+    found = logged(named(tmp_path, "time,hip_position,hip_torque"), ["hip", "knee"])
+    assert found.chosen == ["hip"] and found.still == ["knee"] and not found.without
+    # A position that is no joint's may be its, and a force is of a joint that moves.
+    for more in ("link_position", "knee_torque"):
+        found = logged(named(tmp_path, f"time,hip_position,hip_torque,{more}"), ["hip", "knee"])
+        assert found.still == []
+
+
+def test_a_name_that_is_no_joint_and_a_file_without_joints_are_refused(tmp_path):
+    given = {"knie_force": "knee_torque"}
+    with pytest.raises(ValueError, match=r"--columns knie_force=knee_torque: there is no joint"):
+        logged(named(tmp_path, WHOLE, columns=given), ["hip", "knee"])
+    logged(named(tmp_path, WHOLE, columns={"time": "time", "hip_effort": "hip_torque"}), ["hip"])
+    with pytest.raises(ValueError, match=r"log1.csv: no joint of the model has a position"):
+        logged(named(tmp_path, WHOLE, "time,a_position,a_torque"), ["hip", "knee"])
+
+
+def test_a_file_that_cannot_be_written_is_refused_at_once(tmp_path, capsys):
+    xml = tmp_path / "two.xml"
+    xml.write_text(TWO)
+    path = named(tmp_path, WHOLE).file
+    for save, what in (("x.urdf", "--save x.xml"), ("x.json", "several joints are no one model")):
+        options = ["--mujoco", str(xml), "--save", save]
+        assert main(["explain", path, *options]) == 2
+        assert what in capsys.readouterr().err
+
+
+def test_what_makes_the_held_out_recording_worse_is_not_written():
+    """Of a wrong and a right change the right one; none where each is worse than nothing."""
+    effects = {"right": -0.5, "wrong": 0.2, "worse": 0.9}
+
+    def errors(some):
+        return [np.exp(sum(effects[name] for name in some)), 0.01]
+
+    assert kept(["right", "worse"], errors) == ["right"]
+    assert kept(["right", "wrong"], errors) == ["right", "wrong"]  # together no worse than before
+    assert kept(["worse", "wrong"], errors) == []
+    assert kept(["worse"], lambda some: []) == ["worse"]  # nothing is held out
 
 
 # ---- forms in which robots are logged ----

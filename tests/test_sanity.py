@@ -8,7 +8,7 @@ import pytest
 
 from jaxfric import Recording, cli, explain
 from jaxfric.explanation import sanity
-from jaxfric.explanation.sanity import Part, check_logs
+from jaxfric.explanation.sanity import Part, check_logs, faults, limits
 from jaxfric.simulators import Known, Mujoco
 
 mujoco = pytest.importorskip("mujoco")
@@ -105,6 +105,27 @@ def test_two_clocks(motion, rate):
         assert each.faults.drift == pytest.approx(rate, abs=1e-4)
 
 
+def test_one_joint_that_is_late_is_found_beside_others_on_time(motion):
+    time, position, force = motion
+    late = np.column_stack([force[:, 0], np.interp(time - 0.03, time, force[:, 1])])
+    shoulder, elbow = check_logs(parts(time, position, late))
+    assert "clock" not in wrong(shoulder)
+    assert elbow.faults.late == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_joint_has_its_own_clock_where_the_log_has_none(motion, monkeypatch):
+    late = faults.Faults(late=0.012, errors={"clock": 1e-4})
+
+    def find(some):
+        own = late if [part.name for part in some] == ["elbow"] else faults.Faults()
+        return faults.FaultSearch(own, {}, (), [None] * len(some))
+
+    monkeypatch.setattr(faults, "find", find)
+    shoulder, elbow = faults.find_each(parts(*motion))
+    assert not shoulder.faults.clock and elbow.faults.late == 0.012
+    assert elbow.alone and not shoulder.alone
+
+
 def test_a_force_that_acts_late_is_no_clock(motion):
     """A command that comes before its motion is a dead time, which is told from a lag elsewhere."""
     time, position, force = motion
@@ -164,6 +185,40 @@ def test_columns_of_another_joint(motion):
         assert "position of joint elbow counts the other way" in each.wrong
     shoulder, elbow = check_logs(parts(time, position, force[:, [0, 0]]))
     assert shoulder.wrong is None and "one column for two joints" in elbow.wrong
+
+
+def test_angles_in_degrees_and_columns_of_whole_joints_that_are_swapped(motion):
+    time, position, force = motion
+    for each in check_logs(parts(time, np.rad2deg(position), force)):
+        assert "in degrees" in each.wrong and "--scale position=0.0174533" in each.wrong
+    for each in check_logs(parts(time, position[:, ::-1], force[:, ::-1])):
+        assert "columns of the joints shoulder and elbow are swapped" in each.wrong
+        assert "elbow_position=NAME,elbow_force=NAME" in each.wrong
+
+
+def test_beside_forces_that_are_swapped_no_value_is_told(motion):
+    swapped = parts(*motion)[1]
+    other = dataclasses.replace(swapped.recording, force=parts(*motion)[0].recording.force)
+    both = [parts(*motion)[0]._replace(recording=dataclasses.replace(
+        parts(*motion)[0].recording, force=swapped.recording.force)), swapped._replace(
+        recording=other)]  # fmt: skip
+    checked = check_logs(both)[1]
+    assert checked.wrong
+    found = explain(other, checked)
+    assert found.findings == [] and found.verdict == "unexplained"
+
+
+def test_noise_on_a_flat_friction_is_no_limit(motion):
+    time, position, force = motion
+    flat = np.sign(np.gradient(position[:, 1], time))
+    noisy = flat + 0.15 * np.random.default_rng(3).normal(size=len(flat))
+    recording = Recording(time, noisy, position[:, 1], units=UNITS)
+    limit = limits.Estimate(np.float64(1.0), np.float64(0.01), "N·m")
+    assert limits.noisy(recording, limit)
+    assert not limits.noisy(dataclasses.replace(recording, force=2 * force[:, 1] / np.std(
+        force[:, 1])), limit)  # fmt: skip
+    (checked,) = check_logs([Part(recording, None, Known(flat))])
+    assert "force_limit" not in wrong(checked)
 
 
 def test_sign_and_torque_constant(motion):

@@ -151,7 +151,9 @@ LENGTHS = {"mm": 1e-3}
 
 def _changes(simulator: Mujoco) -> Iterator[Change]:
     joints = simulator.joints
-    swaps = [(one, two) for i, one in enumerate(joints) for two in joints[i + 1 :]]
+    swaps: list[tuple[str, ...]] = [
+        (one, two) for i, one in enumerate(joints) for two in joints[i + 1 :]
+    ]
     # Joints that are counted from the other end.
     swaps += [tuple(joints)] if len(joints) > 2 else []
     yield from (Change((name,), -1.0) for name in joints)
