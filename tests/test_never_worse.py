@@ -24,6 +24,7 @@ from jaxfric.explanation import (
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
+from jaxfric.identification.uncertainty import Estimate
 from jaxfric.simulation.errors import delay_of, force_error, in_motion, outliers
 from jaxfric.simulation.prediction import Prepared
 from jaxfric.terms.effects import EFFECTS
@@ -510,6 +511,32 @@ class Reported:
     def error(self):
         """Each that is wrong adds to an error that is mostly noise, and the best one some more."""
         return 0.12 + 0.003 * sum(n in self.names for n in self.wrong) + 0.004 * ("a" in self.names)
+
+
+def test_a_change_whose_interval_holds_none_is_no_finding(monkeypatch):
+    """Beside its moment's uncertainty; what has no moment stays."""
+
+    class Dated(Reported):
+        def __init__(self, names, wrong):
+            super().__init__(names, wrong)
+            for each in self.selection.selected:
+                each.effect.moment = "" if each.effect.name == "a" else "step_time"
+            self.selection.last = types.SimpleNamespace(terms=[terms.Viscous() for _ in names])
+            self.selection.term_index = lambda number: number
+
+        def without(self, number):
+            return Dated(self.names[:number] + self.names[number + 1 :], self.wrong)
+
+    errors = {"a": 1.0, "b": 0.6, "c": 0.1}
+
+    def estimated(some):
+        return [
+            {"viscous": Estimate(np.float64(1.0), np.float64(errors[name]), "")}
+            for name in some.names
+        ]
+
+    monkeypatch.setattr(improvement, "estimated", estimated)
+    assert improvement.without_unsure(Dated("abc", "")).names == "ac"
 
 
 @pytest.mark.parametrize(("wrong", "left"), [("c", "ab"), ("b", "ac"), ("bc", "b"), ("", "abc")])
