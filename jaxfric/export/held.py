@@ -21,7 +21,10 @@ def kept(changes: Sequence[T], errors: Callable[[Sequence[T]], Sequence[float]])
     def badness(some: Sequence[T]) -> float:
         return float(np.sum(np.log(np.maximum(errors(some), np.finfo(float).tiny))))
 
-    none, found = badness(()), list(changes)
+    found = list(changes)
+    if not found:
+        return found
+    none = badness(())
     while found and badness(found) > none:
         found = min(([*found[:i], *found[i + 1 :]] for i in range(len(found))), key=badness)
     return found

@@ -95,7 +95,7 @@ def patch(
                 values[key] = before, float(moved.value)
     compared = _Compared(source, found, recordings)
     owners = list(dict.fromkeys(map(_owner, values)))
-    good = kept(owners, lambda some: compared.held(_of(values, some))) if owners else []
+    good = kept(owners, lambda some: compared.held(_of(values, some)))
     left += [
         f"{key} → {to:.5g}: {WORSE}" for key, (_, to) in values.items() if _owner(key) not in good
     ]
