@@ -78,7 +78,7 @@ def test_every_kind_has_a_sentence_with_its_number():
         (60 / (2 * np.pi), "velocity_scale", "rpm beside rad"),
         (1000.0, "velocity_scale", "0.001"),
         (180 / np.pi, "velocity_scale", "deg/s beside rad"),
-        (0.93, "velocity_gain", "1.08"),
+        (0.93, "velocity_gain", "1.075"),
     ],
 )
 def test_a_velocity_in_another_unit_or_direction(factor, name, said):
@@ -87,6 +87,31 @@ def test_a_velocity_in_another_unit_or_direction(factor, name, said):
     assert found[0].name == name and {r.name for r in found} <= {name, "magnitude"}
     assert said in found[0].text
     assert found[0].severe is (name != "velocity_gain")
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.01])
+def test_a_scale_a_little_off_is_told_and_is_in_the_intervals(factor):
+    sound = log()
+    off = changed(sound, velocity=factor * sound.velocity)
+    (remark,) = checks.inspect(off)
+    assert remark.name == "velocity_gain" and f"{1 / factor:.3g}" in remark.text
+    true, found = (jf.identify("coulomb-viscous", each).parameters for each in (sound, off))
+    for name in ("inertia", "viscous+", "viscous-"):
+        low, high = found[name].interval()
+        assert low < true[name].value < high, name
+    assert found["coulomb+"].standard_error < 1.1 * true["coulomb+"].standard_error
+
+
+@given(tau=st.floats(0.0, 0.03), seed=st.integers(0, 5))
+@settings(max_examples=8, deadline=None)
+def test_a_filter_is_no_scale(tau, seed):
+    sound = log(seed)
+    step = float(sound.time[1] - sound.time[0])
+    slow, last = [], sound.velocity[0]
+    for v in np.asarray(sound.velocity):
+        last = last + step / (tau + step) * (v - last)
+        slow.append(last)
+    assert "velocity_gain" not in names(changed(sound, velocity=np.array(slow)))
 
 
 @pytest.mark.parametrize(("factor", "clock"), [(1e3, "ms"), (1e6, "µs")])

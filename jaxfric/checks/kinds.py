@@ -63,8 +63,10 @@ KINDS = (
     Kind(
         "velocity_gain",
         False,
-        "The position moves {value:.3g} times as fast as the velocity column says: its unit or its "
-        "filter is a little off. Leave it out (--columns velocity=) to use the position.",
+        "The position moves {value:.4g} times as fast as the velocity column says: the scale of "
+        "one of the two, the clock or a filter is off by that, and so may be the inertia, viscous "
+        "friction and Stribeck velocity, whose intervals hold both. Leave the velocity out "
+        "(--columns velocity=) to use the position.",
     ),
     Kind(
         "velocity_unrelated",

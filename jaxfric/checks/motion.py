@@ -6,15 +6,18 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
-from ..signals.late_velocity import ALIKE, FEWEST, SHARED
+from ..signals.late_velocity import ALIKE, BLOCKS, FEWEST, SHARED
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
 # small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
 UNCERTAIN = 0.01 / 2**0.5
-# A drive's own filter and scaling leave a recorded velocity within a few hundredths.
+# A drive's own filter leaves the power of a recorded velocity within a few hundredths.
 GAIN = 1.05
+# Increments are 30 times their noise, which so takes 0.1 % off the scale: this is twice that. And
+# three standard errors, which chance exceeds on some axes in a thousand.
+SCALE, SURE = 0.002, 3.0
 # A delay counts where it takes 0.2 % of the power that position and velocity share: 2.5° at their
 # frequency, by which a twentieth of the inertia's force is taken for viscous friction.
 LATE = 0.002
@@ -141,7 +144,37 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     if off > np.log(ALIKE):
         slow = clock.interval > SLOWEST_LOG and clock.interval * gain < SLOWEST_LOG
         return {"time_scale" if slow else "velocity_scale": gain}
-    return found | ({"velocity_gain": gain} if off > np.log(GAIN) else {})
+    if off <= np.log(GAIN):
+        # The first is exact for a filter, the other for a delay, and a scale shows in both.
+        span, changed = recording.num_samples - len(moved), increments.changed
+        both = _slow_gain(moved, driven, changed, span), _slow_gain(a, b, changed[late], span)
+        gain = min(both, key=lambda each: abs(each - 1))
+    return found | ({"velocity_gain": gain} if gain != 1 else {})
+
+
+def _slow_gain(moved: np.ndarray, driven: np.ndarray, changed: np.ndarray, span: int) -> float:
+    """How many times as fast as the velocity column says the position moves, if for sure; else 1.
+
+    A filter takes off what is fast alone: beside one of second order the true velocity is
+    v + a v̇ + b v̈, and the first coefficient of the increments' regression is the scale. `span`,
+    samples, of each.
+    """
+    half = max(2, span // 2)
+    if len(moved) < 2 * half + FEWEST:
+        return 1.0
+    bent = changed[2 * half :] - changed[: -2 * half]
+    moved, driven, changed = (x[half:-half] for x in (moved, driven, changed))
+    columns = np.stack([driven, changed, bent], axis=1)
+    size = np.linalg.norm(columns, axis=0)
+    if not np.all(size > 0):
+        return 1.0
+    columns = columns / size
+    inverse = np.linalg.pinv(columns.T @ columns)
+    found = inverse @ (columns.T @ moved)
+    ends = np.arange(BLOCKS) * len(moved) // BLOCKS
+    scores = np.add.reduceat(columns * (moved - columns @ found)[:, None], ends)
+    gain, error = found[0] / size[0], np.linalg.norm(scores @ inverse[0]) / size[0]
+    return float(gain) if abs(gain - 1) > max(SCALE, SURE * error) else 1.0
 
 
 def _exchanged(recording: Recording, moved: np.ndarray, driven: np.ndarray) -> float | None:

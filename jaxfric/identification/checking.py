@@ -96,6 +96,9 @@ def checked(
             k = names.index("inertia")
             if not abs(alpha[k]) > half[k]:
                 matrices[i, k, k], alphas[i, k] = np.inf, np.nan
+        if not np.isnan(gain := warnings[i, GAIN]):
+            shift = (gain - 1) * _by_velocity(found, i)
+            matrices[i] += np.outer(shift, shift)
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
     warnings = warnings.reshape(faults.shape).astype(np.asarray(found.filtered_force_error).dtype)
@@ -123,7 +126,21 @@ def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
     return abs(late.time) if late.sure(interval) else late.error if delayed else 0.0
 
 
-STRUCTURE, ONE_SPEED = (checks.NAMES.index(name) for name in ("structure_left", "one_speed"))
+def _by_velocity(found: Identified, row: int) -> np.ndarray:
+    """By how much each parameter moves where the velocity is another, times its relative change.
+
+    What has a time in its unit is measured by the velocity, what has none by the position.
+    """
+    term = found.model.term
+    values = np.array([np.ravel(value)[row] for value in found.model.parameters.values()], float)
+    units = [p.dimension for p in (*term.affine, *term.nonlinear)]
+    powers = [d.position if not isinstance(d, str) and d.time else 0 for d in units]
+    return np.where(np.isfinite(values), values, 0.0) * np.array(powers)
+
+
+STRUCTURE, ONE_SPEED, GAIN = (
+    checks.NAMES.index(name) for name in ("structure_left", "one_speed", "velocity_gain")
+)
 
 
 # What says more than that signals contradict each other.
