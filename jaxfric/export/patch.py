@@ -190,8 +190,11 @@ def _acting(told: Explanation) -> tuple[float, float, float, float]:
 
 
 def _moved(told: Explanation):
-    found = next((f for f in told.findings if f.effect == MISMATCH), None)
-    return {} if found is None else found.parameters
+    found: dict[str, Any] = {}
+    for finding in told.findings:
+        if finding.effect == MISMATCH:
+            found |= finding.parameters
+    return found
 
 
 def _unwritten(joint: str, moved) -> str:

@@ -314,10 +314,15 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         table.append([row["joint"], row["verdict"], *cells, "see below" * bool(row["findings"])])
     lines = [f"{printable(simulator)} against {printable(log)}", ""]
     lines += aligned(table, (2, 3, 4, 5))
+    every = [each for row in rows for each in row.get("findings", ())]
+    shared = {each for each in every if every.count(each) > 1}  # said of several joints together
+    lines += [
+        line for each in dict.fromkeys(every) if each in shared for line in ["", *wrapped(each)]
+    ]
     for row in rows:
         said = [row["error"]] if "error" in row else row["findings"]
         for each in said:
-            lines += ["", *wrapped(f"{row['joint']}: {each}")]
+            lines += [] if each in shared else ["", *wrapped(f"{row['joint']}: {each}")]
         if row.get("corrected_before"):
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):

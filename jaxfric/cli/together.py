@@ -1,0 +1,62 @@
+"""A robot's bodies by all of its joints: one value of each, and the joints again with it."""
+
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+
+from ..explanation.agreement import Agreement, Told, agreed, with_bodies
+from ..explanation.sanity import CheckedSimulator
+from ..simulators.patching import folder_of, patched
+from ..terms.effects.parameter_mismatch import MISMATCH
+from .robot_joints import Joint, explained
+
+
+def together(
+    opened: Mapping[str, Joint], found: Sequence[Joint],
+    checked: Mapping[str, CheckedSimulator], shared, arguments: Namespace,
+) -> list[Joint]:  # fmt: skip
+    """The joints with one answer for the bodies that they move.
+
+    Where a joint by itself finds values of bodies wrong, all joints are asked for the fewest such
+    values that explain them all; with these the joints are explained again, each by what is its
+    own. Where the file does not take the values, the joints' own answers stand.
+    """
+    able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
+    if not any(_of_bodies(joint) for joint in able):
+        return list(found)
+    agreement = agreed([Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told])
+    mujoco = able[0].simulator.mujoco if able[0].simulator else None
+    done = patched(mujoco, arguments.mujoco, agreement.values(), folder_of(arguments.mujoco))
+    if done.left:
+        return list(found)
+    source = done.text if agreement.parameters else arguments.mujoco
+    names = [joint.name for joint in able]
+    again = []
+    for joint in found:
+        if joint in able and (_of_bodies(joint) or _moves(joint, agreement)):
+            new = explained(opened[joint.name], checked, source, shared, arguments, settled=True)
+            joint = _joined(joint, new, agreement, names)
+        again.append(joint)
+    return again
+
+
+def _of_bodies(joint: Joint) -> list[str]:
+    """The values of bodies that a joint by itself finds wrong."""
+    findings = joint.told.findings if joint.told else []
+    return [
+        key for f in findings if f.effect == MISMATCH for key in f.parameters if key[:5] == "body/"
+    ]
+
+
+def _moves(joint: Joint, agreement: Agreement) -> bool:
+    """Whether a joint moves one of the bodies whose values are wrong."""
+    bodies = {key.split("/")[1] for key in agreement.parameters}
+    return joint.simulator is not None and bool(bodies & joint.simulator.bodies())
+
+
+def _joined(first: Joint, new: Joint, agreement: Agreement, names: Sequence[str]) -> Joint:
+    """A joint explained again, with what all say of its bodies before it."""
+    if new.told is None or first.told is None:
+        return first
+    if not _moves(first, agreement):
+        return new
+    return new._replace(told=with_bodies(new.told, first.told, agreement, names))
