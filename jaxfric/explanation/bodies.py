@@ -7,6 +7,7 @@ the linear parameters do are looked for by Gauss-Newton's steps, each set by its
 of each number for all joints.
 """
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
@@ -173,7 +174,20 @@ class Bodies:
         return energy, state
 
     def fewest(self) -> State:
-        """The fewest numbers that leave no joint more than all linear parameters do.
+        """The numbers of the fewest bodies that leave no joint more than all linear parameters do,
+        and the fewest of these: one part of a machine is wrong sooner than two.
+        """
+        found = self._fewest(frozenset(self.weights))
+        bodies = sorted({self.owner[n][0] for n in found if n in self.owner})
+        for count in range(1, len(bodies)):
+            for some in itertools.combinations(bodies, count):
+                fewer = self._fewest(frozenset(some))
+                if np.all(self.energies(fewer) <= self.energies(found) + self.enough):
+                    return fewer
+        return found
+
+    def _fewest(self, bodies: frozenset[str]) -> State:
+        """The fewest numbers of joints and those bodies that leave no more than all do.
 
         Each of them beyond its noise; among sets that do as well, the one that changes least.
         """
@@ -181,7 +195,7 @@ class Bodies:
         while np.any(self.energies(found) - self.least > self.enough):
             tried: dict[frozenset[str], tuple[float, State]] = {}
             for state in beam:
-                for name in self._promising(state):
+                for name in self._promising(state, bodies):
                     names = frozenset({*state, name})
                     if names not in tried:
                         tried[names] = self.fitted([*state, name], state)
@@ -200,9 +214,9 @@ class Bodies:
         twins = {f"body/{self.owner[n][0]}/{w}" for n in state if "/mass" in n for w in MASSES}
         return [n for n in self.before if n not in state and n not in twins]
 
-    def _promising(self, state: State) -> list[str]:
+    def _promising(self, state: State, bodies: frozenset[str]) -> list[str]:
         """The numbers beside a state's that would take most, were they linear."""
-        names = self._others(state)
+        names = [n for n in self._others(state) if n in self.place or self.owner[n][0] in bodies]
         mine, slopes = self.slopes(state, state), self.slopes(names, state)
         rest = self.pull - self.gram @ self.shift(state)
         if len(state):
