@@ -108,8 +108,8 @@ def _document(arguments: Namespace, joint: Joint) -> dict[str, Any]:
     return document
 
 
-def _row(joint: Joint) -> dict[str, Any]:
-    """One joint of the summary."""
+def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
+    """One joint of the summary; `file`: what the written file leaves of its force."""
     if joint.told is None:
         return {"joint": joint.name, "verdict": "refused", "error": joint.error}
     errors = joint.told.fit
@@ -121,6 +121,7 @@ def _row(joint: Joint) -> dict[str, Any]:
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
+        **({} if done is None else {"file": done.after(joint.name)}),
     }
 
 
@@ -162,7 +163,7 @@ def _whole(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict
     after = {} if done is None else {"patch": done.to_dict()}
     if len(found) == 1 and found[0].told is not None:
         return _document(arguments, found[0]) | after
-    rows = [_row(joint) | {"explanation": _document(arguments, joint)} for joint in found]
+    rows = [_row(joint, done) | {"explanation": _document(arguments, joint)} for joint in found]
     return {"schema": SCHEMA, "simulator": os.fspath(arguments.mujoco), "joints": rows, **after}
 
 
@@ -179,7 +180,7 @@ def _pages(arguments: Namespace, found: list[Joint], done: Patch | None) -> dict
         if joint.told is not None:
             links[joint.name] = f"{path.stem}_{joint.name}.html"
             texts[str(path.with_name(links[joint.name]))] = _page(arguments, document, joint, done)
-    rows = [_row(joint) for joint in found]
+    rows = [_row(joint, done) for joint in found]
     lines = [] if done is None else [*done.written, *(f"not written: {x}" for x in done.left)]
     again = [] if done is None else [done.rerun.curves(name) for name in done.rerun.joints]
     whole = robot.render(arguments.mujoco, arguments.file, rows, links, lines, again)
@@ -199,7 +200,11 @@ def _print(arguments: Namespace, found: list[Joint], done: Patch | None) -> None
     if len(found) == 1 and found[0].told is not None:
         say(tabulate.explanation(_document(arguments, found[0])))
     else:
-        say(tabulate.joints(arguments.mujoco, arguments.file, [_row(joint) for joint in found]))
+        say(
+            tabulate.joints(
+                arguments.mujoco, arguments.file, [_row(joint, done) for joint in found]
+            )
+        )
     if done is not None:
         say(f"\n{tabulate.patch(arguments.save, done.to_dict())}")
     elif arguments.save and found[0].told is not None:

@@ -5,7 +5,8 @@ from collections.abc import Mapping, Sequence
 
 from ..explanation.agreement import Agreement, Told, agreed, with_bodies
 from ..explanation.sanity import CheckedSimulator
-from ..simulators.patching import folder_of, patched
+from ..simulators.loading import library
+from ..simulators.patching import folder_of, patched, with_inertial
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .robot_joints import Joint, explained
 
@@ -23,8 +24,9 @@ def together(
     able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
     if not any(_of_bodies(joint) for joint in able):
         return list(found)
-    agreement = agreed([Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told])
-    mujoco = able[0].simulator.mujoco if able[0].simulator else None
+    mujoco = library()
+    told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
+    agreement = agreed(told, with_inertial(mujoco, arguments.mujoco))
     done = patched(mujoco, arguments.mujoco, agreement.values(), folder_of(arguments.mujoco))
     if done.left:
         return list(found)

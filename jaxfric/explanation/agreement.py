@@ -1,6 +1,6 @@
 """What all joints of a robot say of its bodies together, beside what each says by itself."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import jax
@@ -46,16 +46,18 @@ class Agreement(NamedTuple):
         return {name: float(moved.value) for name, moved in self.parameters.items()}
 
 
-def agreed(told: Sequence[Told]) -> Agreement:
+def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     """What several joints say of the bodies that move with them.
 
     The values are those of the recordings; the held-out ones, and a kernel of twice the width, say
-    only how well they are known.
+    only how well they are known. `apart`: bodies whose mass and inertia are numbers apart from each
+    other in the simulator's file.
     """
     simulator = told[0].simulator
     bodies = weights(simulator.mujoco, simulator.model)
     with jax.enable_x64(True):
         rows = _rows(told, bodies)
+        rows.apart = apart
         answer = rows.answer()
         values = {n: v for n, v in answer.values.items() if n in rows.owner}
         known = {name: answer.estimates[name] for name in values}

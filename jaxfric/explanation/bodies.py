@@ -8,7 +8,7 @@ of each number for all joints.
 """
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,8 +50,14 @@ class Answer(NamedTuple):
 class Bodies:
     """The rows of all joints, and the numbers of a model's file that their forces depend on."""
 
-    def __init__(self, joints: Sequence[JointRows], weights: Mapping[str, Weight]):
-        self.joints, self.weights = joints, weights
+    def __init__(
+        self,
+        joints: Sequence[JointRows],
+        weights: Mapping[str, Weight],
+        apart: Collection[str] = (),
+    ):
+        """`apart`: bodies whose mass and inertia are numbers apart from each other in the file."""
+        self.joints, self.weights, self.apart = joints, weights, apart
         own = [f"{joint.name}:{name}" for joint in joints for name in joint.own]
         self.place = {name: i for i, name in enumerate(own)}
         self.before = dict.fromkeys(own, 0.0)
@@ -228,7 +234,9 @@ class Bodies:
         return [names[i] for i in np.argsort(-gains, kind="stable")[:TRIED] if gains[i] > 0]
 
     def changed(self, state: State) -> float:
-        """By how much a state's numbers differ from the simulator's, a part of each, summed."""
+        """By how much a state's numbers differ from the simulator's, a part of each, summed; where
+        a mass takes more than one number of the file, that counts as another one.
+        """
         found = 0.0
         for name, value in state.items():
             if name in self.place:
@@ -236,6 +244,8 @@ class Bodies:
                 continue
             before, size = self.before[name], abs(value - self.before[name])
             found += size / (abs(value) + abs(before))
+            body, what = self.owner[name]
+            found += {MASS: body in self.apart, MASS_ALONE: body not in self.apart}.get(what, 0)
         return found
 
     def _rows(self, names: Sequence[str], state: State) -> Fit:

@@ -1,6 +1,7 @@
 """What an explanation says of a simulator, written into the simulator's own file."""
 
 import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..explanation import Explanation
+from ..explanation.acceptance import LINEARITY
 from ..explanation.attributes import CONSTANT, GAIN
 from ..explanation.errors import through_kernel
 from ..identification.uncertainty import Estimate
@@ -16,6 +18,7 @@ from ..models import Model
 from ..simulators import Mujoco, actuation
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
+from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
 from ..terms.effects import EFFECTS, traits
@@ -45,7 +48,8 @@ class Patch(NamedTuple):
       file's name.
     - `written` and `left`: what was changed, and what was not and why, a line each.
     - `errors`: force errors through the kernel of the explanation, by recording ("force_error",
-      "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it.
+      "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it; from
+      the file as it was read again. `misses`: where that is more than the joint's answer leaves.
     """
 
     text: str
@@ -54,14 +58,19 @@ class Patch(NamedTuple):
     left: list[str]
     errors: dict[str, dict[str, dict[str, float]]]
     module: str
+    misses: tuple[str, ...] = ()
     rerun: Rerun = Rerun()
 
     def to_dict(self) -> dict[str, Any]:
         """What was done as plain data, without the texts."""
         return {
             "written": self.written, "left": self.left, "errors": self.errors,
-            "rerun": self.rerun.to_dict(),
+            "misses": list(self.misses), "rerun": self.rerun.to_dict(),
         }  # fmt: skip
+
+    def after(self, joint: str) -> dict[str, float]:
+        """What the file leaves of a joint's force, with the forces beside it, by recording."""
+        return {name: reached(each) for name, each in self.errors[joint].items()}
 
 
 def patch(
@@ -91,8 +100,6 @@ def patch(
                 before, _ = values.get(key, (float(moved.before), 0.0))
                 values[key] = before, float(moved.value)
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
-    written = [f"{key}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written]
-    left += [f"{key} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
     beside = {joint: _beside(told) for joint, told in found.items()}
     models: dict[str, Model] = {}
     for joint, model in beside.items():
@@ -105,21 +112,82 @@ def patch(
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
+    errors = _read_again(source, done.text, found, recordings, models)
+    if worse := [joint for joint, each in errors.items() if _worse(each)]:
+        kept = {key: to for key, (_, to) in values.items() if not key.startswith("body/")}
+        why = "; ".join(
+            f"joint {joint} would be worse: {_from_to(errors[joint])}" for joint in worse
+        )
+        gone = {key: why for key in done.written if key.startswith("body/")}
+        done = patched(library(), source, kept)
+        done = done._replace(left={**done.left, **gone})
+        errors = _read_again(source, done.text, found, recordings, models)
+    written = [
+        f"{_label(key)}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written
+    ]
     written += [
         f"{module}: joint {joint}: {', '.join(p.name for p in callback.parts(model))}"
         for joint, model in models.items()
     ]
-    errors = {}
+    left += [f"{_label(key)} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
+    misses = tuple(_miss(joint, told, errors[joint]) for joint, told in found.items())
+    patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
+    return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+def _label(key: str) -> str:
+    """A value's name, with what of the body goes along with it."""
+    if key.endswith(f"/{MASS_ALONE}"):
+        return key.removesuffix(MASS_ALONE) + MASS
+    return f"{key} (its inertia in proportion)" if key.endswith(f"/{MASS}") else key
+
+
+def _read_again(source, text: str, found, recordings, models) -> dict[str, dict[str, Any]]:
+    """The force errors of all joints by the file as it was written, see `Patch.errors`."""
+    errors: dict[str, dict[str, Any]] = {}
     shared: dict[bytes, Any] = {}
     for joint, told in found.items():
         commanded = _commanded(recordings[joint][0])
         pair = (
             Mujoco(source, joint, shared=shared, commanded=commanded),
-            Mujoco(done.text, joint, folder_of(source), shared, commanded=commanded),
+            Mujoco(text, joint, folder_of(source), shared, commanded=commanded),
         )
         errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
-    patch = Patch(done.text, forces, written, left, errors, module)
-    return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+    return errors
+
+
+def reached(error: Mapping[str, float]) -> float:
+    """The force error with all that was written: the file, and the forces beside it if any."""
+    return error.get("forces", error["file"])
+
+
+def _more(one: float, other: float) -> bool:
+    """Whether an error, relative to the force, is more than another beyond what a sensor tells."""
+    return one**2 > other**2 + LINEARITY**2
+
+
+def _worse(errors: Mapping[str, Mapping[str, float]]) -> bool:
+    """Whether what was written leaves a joint more than the file as it was, on any recording."""
+    return any(_more(reached(each), each["before"]) for each in errors.values())
+
+
+def _from_to(errors: Mapping[str, Mapping[str, float]]) -> str:
+    """Errors before and after in words."""
+    return ", ".join(
+        f"{each['before']:.2%} → {reached(each):.2%}{' held out' * name.startswith('holdout')}"
+        for name, each in errors.items()
+    )
+
+
+def _miss(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]]) -> str:
+    """That what was written leaves more of a joint's force than its answer does, if it does."""
+    texts = []
+    for name, each in errors.items():
+        own = told.fit[f"filtered_{name}"]
+        if own and _more(reached(each), own["after"]):
+            held = "of the held-out recording " if name.startswith("holdout") else ""
+            texts.append(f"{held}{own['after']:.2%} by its answer, {reached(each):.2%} by the file")
+    return f"joint {joint}: not all of its answer is in the file: {'; '.join(texts)}" * bool(texts)
 
 
 def _commanded(recording: Recording) -> bool:

@@ -47,6 +47,18 @@ def patched(
     return Patched(text, tuple(written), left)
 
 
+def with_inertial(mujoco: Any, source: str | Path) -> set[str]:
+    """The names of the bodies whose mass and inertia stand apart in the file, in an `inertial`; of
+    others, which geoms weigh, the inertia goes along with the mass.
+    """
+    tree = bodies(tags(_text(mujoco, source)))
+    model = read(mujoco, source)
+    if len(tree.bodies) != model.nbody - 1:
+        return set()
+    every = enumerate(tree.children, 1)
+    return {label(model, body) for body, children in every if children["inertial"]}
+
+
 def _text(mujoco: Any, source: str | Path) -> str:
     """The model's MJCF; of a URDF that of MuJoCo's own translation."""
     text = str(source) if is_text(source) else Path(source).read_text(encoding="utf-8")
