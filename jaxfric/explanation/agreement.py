@@ -16,6 +16,7 @@ from .acceptance import LINEARITY
 from .attributes import CONSTANT, GAIN, listed
 from .bodies import Bodies, State
 from .explained import Explanation
+from .fewest_numbers import answer
 from .finding import Finding, Moved
 from .joint_rows import joint_rows
 from .quantities import quantity
@@ -57,17 +58,16 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     bodies = weights(simulator.mujoco, simulator.model)
     with jax.enable_x64(True):
         rows = _rows(told, bodies)
-        rows.apart = apart
-        answer = rows.answer()
-        values = {n: v for n, v in answer.values.items() if n in rows.owner}
-        known = {name: answer.estimates[name] for name in values}
+        found = answer(rows, apart)
+        values = {n: v for n, v in found.values.items() if n in rows.owner}
+        known = {name: found.estimates[name] for name in values}
         for more, joined in ((_rows(told, bodies, wide=2), spelled.with_smoothing),
                              (_rows(told, bodies, held=True), spelled.with_elsewhere)):  # fmt: skip
             if values and more is not None:
-                _, there = more.fitted(answer.values, answer.values)
+                _, there = more.fitted(found.values, found.values)
                 known = joined(known, more.estimates(there))
     moved = {name: Moved(rows.before[name], known[name]) for name in values}
-    return Agreement(moved, _text(moved, answer.instead, rows, told), answer.instead)
+    return Agreement(moved, _text(moved, found.instead, rows, told), found.instead)
 
 
 def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bodies | None:

@@ -7,44 +7,22 @@ the linear parameters do are looked for by Gauss-Newton's steps, each set by its
 of each number for all joints.
 """
 
-import itertools
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..simulators.rigid import PARAMETERS
-from ..simulators.weights import MASS, MASS_ALONE, Weight, attribute
+from ..simulators.weights import Weight, attribute
 from .intervals import spread
 from .joint_rows import JointRows
-from .least_squares import orthonormal
-from .mismatch import SURE
 from .regression import Fit
 
-MASSES = MASS, MASS_ALONE
 # A robot's values by name, those that differ from the simulator's; of a joint's own the change.
 State = dict[str, float]
-# Sets of one number fewer to which each other number is added, and numbers that are tried with
-# each: those that would take most if all were linear. Wider beams find nothing that these do not
-# where one or two numbers are wrong, for then all sets of two are tried with the best of one.
-BEAM, TRIED = 8, 16
 # Steps of Gauss and Newton, which converge in four or five; halvings of one; a gain that ends them,
 # as a part of the energy; the step of a numerical derivative, as a part of a value's own size.
 STEPS, HALVINGS, NO_GAIN, STEP = 20, 8, 1e-9, 1e-4
-# A number that adds less than this to the energy of the force, by a change of its own size, is not
-# seen but for rounding.
-UNSEEN = 1e-12
-
-
-class Answer(NamedTuple):
-    """What all joints say together: the values that differ by name, with `estimates`, and what else
-    would do as well in place of each, `instead`.
-    """
-
-    values: State
-    estimates: dict[str, Estimate]
-    instead: dict[str, tuple[str, ...]]
 
 
 class Bodies:
@@ -54,10 +32,8 @@ class Bodies:
         self,
         joints: Sequence[JointRows],
         weights: Mapping[str, Weight],
-        apart: Collection[str] = (),
     ):
-        """`apart`: bodies whose mass and inertia are numbers apart from each other in the file."""
-        self.joints, self.weights, self.apart = joints, weights, apart
+        self.joints, self.weights = joints, weights
         own = [f"{joint.name}:{name}" for joint in joints for name in joint.own]
         self.place = {name: i for i, name in enumerate(own)}
         self.before = dict.fromkeys(own, 0.0)
@@ -93,12 +69,13 @@ class Bodies:
         bent = np.einsum("i,kij,j->k", shift, self.grams, shift)
         return self.powers - 2 * self.pulls @ shift + bent
 
-    def energies(self, state: State) -> np.ndarray:
+    def energies(self, state: State, any_: bool = False) -> np.ndarray:
         """What a state leaves of each joint, in units of its noise's energy, `(joints,)`."""
-        return self._energies(self.shift(state))
+        return self._energies(self.shift(state, any_))
 
-    def shift(self, state: State) -> np.ndarray:
-        """By how much the linear parameters differ from the simulator's.
+    def shift(self, state: State, any_: bool = False) -> np.ndarray:
+        """By how much the linear parameters differ from the simulator's; `any_`: also of a body
+        that cannot be.
 
         **Raises:** `ValueError` for a body that cannot be.
         """
@@ -107,14 +84,15 @@ class Bodies:
             found[self.place[name]] = state[name]
         for body in {self.owner[n][0] for n in state if n in self.owner}:
             start = self.starts[body]
-            new = self.weight(body, state).parameters()
+            new = self.weight(body, state, any_).parameters()
             found[start : start + PARAMETERS] = new - self.weights[body].parameters()
         return found
 
-    def weight(self, body: str, state: State) -> Weight:
+    def weight(self, body: str, state: State, any_: bool = False) -> Weight:
         """What a body weighs in a state."""
         owned = ((self.owner[n], v) for n, v in state.items() if n in self.owner)
-        return self.weights[body].with_values({what: v for (b, what), v in owned if b == body})
+        own = {what: v for (b, what), v in owned if b == body}
+        return self.weights[body].with_values(own, any_)
 
     def value(self, name: str, state: State) -> float:
         """A number in a state that may not hold it, as it goes along with the others."""
@@ -123,7 +101,7 @@ class Bodies:
         body, what = self.owner[name]
         return self.weight(body, state).values()[what]
 
-    def _size(self, name: str) -> float:
+    def size(self, name: str) -> float:
         """The size of a number, that of zero too."""
         if name in self.place:
             return 1.0
@@ -132,7 +110,7 @@ class Bodies:
         sizes = {"mass": weight.mass, "centre": weight.extent()}
         return sizes.get(what.partition("_")[0], weight.mass * weight.extent() ** 2)
 
-    def slopes(self, names: Iterable[str], state: State) -> np.ndarray:
+    def slopes(self, names: Iterable[str], state: State, any_: bool = False) -> np.ndarray:
         """Derivatives of the linear parameters by the numbers of those names, `(count, names)`."""
         found = []
         for name in names:
@@ -140,36 +118,52 @@ class Bodies:
                 found.append(np.eye(1, len(self.pull), self.place[name])[0])
                 continue
             value, sides = self.value(name, state), []
-            for step in STEP * self._size(name) * np.array([1.0, -1.0, 0.0]):
+            for step in STEP * self.size(name) * np.array([1.0, -1.0, 0.0]):
                 try:
-                    sides.append((value + step, self.shift({**state, name: value + step})))
+                    sides.append((value + step, self.shift({**state, name: value + step}, any_)))
                 except ValueError:
                     continue
             (a, one), (b, other) = sides[0], sides[1]
+            if a == b:
+                raise ValueError(f"{name} is beyond all bounds")
             found.append((one - other) / (a - b))
         return np.array(found).T
 
     def fitted(self, names: Iterable[str], start: State) -> tuple[float, State]:
-        """Those numbers by least squares over all joints, from a state; the energy that is left."""
-        names = list(names)
-        state = {name: self.value(name, start) for name in names}
+        """Those numbers by least squares over all joints, from a state; the energy that is left.
+
+        The way may lead through bodies that cannot be; the energy of an end that cannot is
+        infinite.
+        """
+        state = dict(start)
         try:
-            energy = float(self.energies(state).sum())
+            state = {name: self.value(name, start) for name in names}
+            energy, state = self._descended(state, True)
+            if abs(float(self.energies(state).sum()) - energy) <= NO_GAIN * energy:
+                return energy, state
+            return self._descended(state, False)
         except ValueError:
             return np.inf, state
+
+    def _descended(self, state: State, any_: bool) -> tuple[float, State]:
+        """The numbers of a state by Gauss and Newton's steps, and the energy that is left.
+
+        **Raises:** `ValueError` for a body that cannot be.
+        """
+        names, energy = list(state), float(self.energies(state, any_).sum())
         for _ in range(STEPS):
-            slopes = self.slopes(names, state)
+            slopes = self.slopes(names, state, any_)
             size = np.sqrt(np.maximum(np.sum(slopes * (self.gram @ slopes), axis=0), 1e-300))
             inner = slopes.T @ self.gram @ slopes / np.outer(size, size)
-            outer = slopes.T @ (self.pull - self.gram @ self.shift(state)) / size
+            outer = slopes.T @ (self.pull - self.gram @ self.shift(state, any_)) / size
             if not np.isfinite(inner).all():
-                return np.inf, state
+                raise ValueError("its values are beyond all bounds")
             step = np.linalg.lstsq(inner, outer, rcond=1e-10)[0] / size
             before = energy
             for part in 0.5 ** np.arange(HALVINGS):
                 moved = {n: state[n] + part * s for n, s in zip(names, step, strict=True)}
                 try:
-                    left = float(self.energies(moved).sum())
+                    left = float(self.energies(moved, any_).sum())
                 except ValueError:
                     continue
                 if left < energy:
@@ -179,76 +173,7 @@ class Bodies:
                 break
         return energy, state
 
-    def fewest(self) -> State:
-        """The numbers of the fewest bodies that leave no joint more than all linear parameters do,
-        and the fewest of these: one part of a machine is wrong sooner than two.
-        """
-        found = self._fewest(frozenset(self.weights))
-        bodies = sorted({self.owner[n][0] for n in found if n in self.owner})
-        for count in range(1, len(bodies)):
-            for some in itertools.combinations(bodies, count):
-                fewer = self._fewest(frozenset(some))
-                if np.all(self.energies(fewer) <= self.energies(found) + self.enough):
-                    return fewer
-        return found
-
-    def _fewest(self, bodies: frozenset[str]) -> State:
-        """The fewest numbers of joints and those bodies that leave no more than all do.
-
-        Each of them beyond its noise; among sets that do as well, the one that changes least.
-        """
-        found, beam = State(), [State()]
-        while np.any(self.energies(found) - self.least > self.enough):
-            tried: dict[frozenset[str], tuple[float, State]] = {}
-            for state in beam:
-                for name in self._promising(state, bodies):
-                    names = frozenset({*state, name})
-                    if names not in tried:
-                        tried[names] = self.fitted([*state, name], state)
-            best = sorted(tried.values(), key=lambda each: each[0])[:BEAM]
-            beam = [state for energy, state in best if np.isfinite(energy)]
-            sure = [state for state in beam if self.sure(state)]
-            if not sure:
-                break
-            alike = self.energies(sure[0]) + self.enough
-            sure = [state for state in sure if np.all(self.energies(state) <= alike)]
-            found = min(sure, key=self.changed)
-        return found
-
-    def _others(self, state: State) -> list[str]:
-        """The numbers beside a state's; of a body's mass no second one."""
-        twins = {f"body/{self.owner[n][0]}/{w}" for n in state if "/mass" in n for w in MASSES}
-        return [n for n in self.before if n not in state and n not in twins]
-
-    def _promising(self, state: State, bodies: frozenset[str]) -> list[str]:
-        """The numbers beside a state's that would take most, were they linear."""
-        names = [n for n in self._others(state) if n in self.place or self.owner[n][0] in bodies]
-        mine, slopes = self.slopes(state, state), self.slopes(names, state)
-        rest = self.pull - self.gram @ self.shift(state)
-        if len(state):
-            inner = np.linalg.pinv(mine.T @ self.gram @ mine, rcond=1e-12)
-            slopes = slopes - mine @ (inner @ (mine.T @ self.gram @ slopes))
-        sizes = np.sum(slopes * (self.gram @ slopes), axis=0)
-        seen = sizes * np.array([self._size(n) ** 2 for n in names]) > UNSEEN * self.powers.sum()
-        gains = np.where(seen, (rest @ slopes) ** 2 / np.maximum(sizes, 1e-300), 0.0)
-        return [names[i] for i in np.argsort(-gains, kind="stable")[:TRIED] if gains[i] > 0]
-
-    def changed(self, state: State) -> float:
-        """By how much a state's numbers differ from the simulator's, a part of each, summed; where
-        a mass takes more than one number of the file, that counts as another one.
-        """
-        found = 0.0
-        for name, value in state.items():
-            if name in self.place:
-                found += 1.0
-                continue
-            before, size = self.before[name], abs(value - self.before[name])
-            found += size / (abs(value) + abs(before))
-            body, what = self.owner[name]
-            found += {MASS: body in self.apart, MASS_ALONE: body not in self.apart}.get(what, 0)
-        return found
-
-    def _rows(self, names: Sequence[str], state: State) -> Fit:
+    def rows(self, names: Sequence[str], state: State) -> Fit:
         """The rows of all joints at a state, as a fit with the derivatives by those numbers."""
         slopes, shift = self.slopes(names, state), self.shift(state)
         columns, left = [], []
@@ -269,7 +194,7 @@ class Bodies:
     def estimates(self, state: State) -> dict[str, Estimate]:
         """The numbers of a state with their standard errors, from blocks of all joints' rows."""
         names = list(state)
-        known = spread(self._rows(names, state), self.block)
+        known = spread(self.rows(names, state), self.block)
         freedom = known.degrees_of_freedom(np.eye(len(names)))
         errors = np.sqrt(np.diag(known.covariance))
         return {
@@ -282,51 +207,3 @@ class Bodies:
             return ""
         body, what = self.owner[name]
         return attribute(self.weights[body], body, what).unit
-
-    def sure(self, state: State) -> bool:
-        """Whether each number of a state differs from the simulator's beyond noise."""
-        known = self.estimates(state)
-        return all(
-            abs(float(e.value) - self.before[n]) > SURE * float(e.standard_error)
-            for n, e in known.items()
-        )
-
-    def instead(self, state: State) -> dict[str, tuple[str, ...]]:
-        """To each number of a state, others that would do as well in its place.
-
-        With these all joints together leave no more than noise like theirs takes for the number
-        that is replaced, or each of them no more than a sensor of force resolves.
-        """
-        found = {}
-        for name in state:
-            rest = {n: v for n, v in state.items() if n != name}
-            names = [n for n in self._others(rest) if n != name]
-            energy, noise = self.energies(state), self._noise(name, rest, state)
-            more = {n: self._left([*rest, n], rest) - energy for n in names}
-            alike = (
-                n for n, each in more.items()
-                if each.sum() <= SURE**2 * noise or np.all(each <= self.enough)
-            )  # fmt: skip
-            if others := tuple(alike):
-                found[name] = others
-        return found
-
-    def _left(self, names: Sequence[str], start: State) -> np.ndarray:
-        """What the best values of some numbers leave of each joint, infinite for none that can be,
-        `(joints,)`.
-        """
-        energy, state = self.fitted(names, start)
-        return self.energies(state) if np.isfinite(energy) else np.full(len(self.joints), np.inf)
-
-    def _noise(self, name: str, rest: State, state: State) -> float:
-        """The energy that a number beside others takes of noise like what a state leaves."""
-        rows = self._rows([*rest, name], state)
-        beside = orthonormal(rows.columns[:, :-1])
-        lone = rows.columns[:, -1] - beside @ (beside.T @ rows.columns[:, -1])
-        size = max(float(np.linalg.norm(lone)), 1e-300)
-        return float(np.sum(np.bincount(self.block, lone / size * rows.residual) ** 2))
-
-    def answer(self) -> Answer:
-        """The fewest numbers, how well they are known, and what else would do as well."""
-        state = self.fewest()
-        return Answer(state, self.estimates(state) if state else {}, self.instead(state))

@@ -45,9 +45,11 @@ class Weight(NamedTuple):
         """How far out its mass lies, m: the largest radius of gyration about its frame."""
         return float(np.sqrt(np.max(self.inertia) / self.mass + self.centre @ self.centre))
 
-    def with_values(self, own: Mapping[str, float]) -> "Weight":
+    def with_values(self, own: Mapping[str, float], any_: bool = False) -> "Weight":
         """The same with the values that are given; inertias that are not given stay, go along with
         `mass`, or are raised as little as makes the body physically possible.
+
+        **Arguments:** `any_`: as the numbers say, be it possible or not.
 
         **Raises:** `ValueError` for a body that cannot be.
         """
@@ -59,6 +61,8 @@ class Weight(NamedTuple):
         for k, letter in enumerate("xyz"):
             centre[k] = own.get(f"centre_{letter}", centre[k])
             inertia[k] = own.get(f"inertia_{letter}", inertia[k])
+        if any_:
+            return Weight(mass, centre, inertia, self.axes)
         given = [k for k, letter in enumerate("xyz") if f"inertia_{letter}" in own]
         if mass <= 0 or np.any(inertia < 0):
             raise ValueError("it would be below zero")
