@@ -82,9 +82,11 @@ def patch(
 ) -> Patch:
     """The simulator's file with the findings of its joints.
 
-    **Arguments:** `source`, the file; by joint, the outermost last: the explanations, each of which
-    takes the bodies as those farther out have corrected them, and the recordings (the first is the
-    one explained, the second held out); `name` of the file to be, for the module beside it;
+    The file is read again as it was written. Values of bodies with which a joint is worse than
+    before, on any recording, are not written.
+
+    **Arguments:** `source`, the file; by joint the explanations, and the recordings (the first is
+    the one explained, the second held out); `name` of the file to be, for the module beside it;
     `again`, what a closed loop needs to be run again.
     """
     values: dict[str, tuple[float, float]] = {}
