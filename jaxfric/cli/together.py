@@ -3,6 +3,7 @@
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 
+from ..explanation.acceptance import LINEARITY
 from ..explanation.agreement import Agreement, Told, agreed, with_bodies
 from ..explanation.sanity import CheckedSimulator
 from ..simulators.loading import library
@@ -19,7 +20,8 @@ def together(
 
     Where a joint by itself finds values of bodies wrong, all joints are asked for the fewest such
     values that explain them all; with these the joints are explained again, each by what is its
-    own. Where the file does not take the values, the joints' own answers stand.
+    own. Where the file does not take the values, or a joint is left with clearly more than by its
+    own answer, the joints' own answers stand: what they contradict each other in is not written.
     """
     able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
     if not any(_of_bodies(joint) for joint in able):
@@ -36,9 +38,22 @@ def together(
     for joint in found:
         if joint in able and (_of_bodies(joint) or _moves(joint, agreement)):
             new = explained(opened[joint.name], checked, source, shared, arguments, settled=True)
+            if _clearly_more(new, joint):
+                return list(found)
             joint = _joined(joint, new, agreement, names)
         again.append(joint)
     return again
+
+
+def _clearly_more(new: Joint, own: Joint) -> bool:
+    """Whether an answer leaves more of a joint's force than its own does, on every recording, by
+    more than a sensor of force resolves.
+    """
+    if new.told is None or own.told is None:
+        return True
+    names = ("filtered_force_error", "filtered_holdout_force_error")
+    pairs = [(new.told.fit[n], own.told.fit[n]) for n in names if own.told.fit[n]]
+    return all(a["after"] ** 2 > b["after"] ** 2 + LINEARITY**2 for a, b in pairs)
 
 
 def _of_bodies(joint: Joint) -> list[str]:

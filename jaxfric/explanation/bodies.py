@@ -123,6 +123,9 @@ class Bodies:
                     sides.append((value + step, self.shift({**state, name: value + step}, any_)))
                 except ValueError:
                     continue
+            if len(sides) < 2:  # at an end of what a body can be, it cannot change by itself
+                found.append(np.zeros(len(self.pull)))
+                continue
             (a, one), (b, other) = sides[0], sides[1]
             if a == b:
                 raise ValueError(f"{name} is beyond all bounds")

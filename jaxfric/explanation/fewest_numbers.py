@@ -1,6 +1,7 @@
 """The fewest numbers of a robot's file that explain the forces of all its joints."""
 
 import itertools
+import sys
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
@@ -42,26 +43,31 @@ def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
 
 
 def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
-    """The numbers of the fewest bodies that leave no joint more than all linear parameters do, and
-    the fewest of these: one part of a machine is wrong sooner than two.
+    """The fewest numbers that leave no joint more than all linear parameters do; of fewer bodies,
+    where one number more does for each body fewer: one part of a machine is wrong sooner than two.
     """
     found = _fewest(robot, frozenset(robot.weights), apart)
+    if np.any(robot.energies(found) - robot.least > robot.enough):
+        return found
     bodies = sorted({robot.owner[n][0] for n in found if n in robot.owner})
     for count in range(1, len(bodies)):
         for some in itertools.combinations(bodies, count):
-            fewer = _fewest(robot, frozenset(some), apart)
+            most = len(found) + len(bodies) - count
+            fewer = _fewest(robot, frozenset(some), apart, most)
             if np.all(robot.energies(fewer) <= robot.energies(found) + robot.enough):
                 return fewer
     return found
 
 
-def _fewest(robot: Bodies, bodies: frozenset[str], apart: Collection[str]) -> State:
-    """The fewest numbers of joints and those bodies that leave no more than all do.
+def _fewest(
+    robot: Bodies, bodies: frozenset[str], apart: Collection[str], most: int = sys.maxsize
+) -> State:
+    """The fewest numbers of joints and those bodies that leave no more than all do, `most` at most.
 
     Each of them beyond its noise; among sets that do as well, the one that changes least.
     """
     found, beam = State(), [State()]
-    while np.any(robot.energies(found) - robot.least > robot.enough):
+    while len(found) < most and np.any(robot.energies(found) - robot.least > robot.enough):
         tried: dict[frozenset[str], tuple[float, State]] = {}
         for state in beam:
             for name in _promising(robot, state, bodies):

@@ -101,6 +101,9 @@ def patch(
             elif key != CONSTANT:
                 before, _ = values.get(key, (float(moved.before), 0.0))
                 values[key] = before, float(moved.value)
+    apart = _contradicted(found)
+    left += [f"{_label(key)}: {why}" for key, why in apart.items()]
+    values = {key: pair for key, pair in values.items() if key not in apart}
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
     beside = {joint: _beside(told) for joint, told in found.items()}
     models: dict[str, Model] = {}
@@ -135,6 +138,23 @@ def patch(
     misses = tuple(_miss(joint, told, errors[joint]) for joint, told in found.items())
     patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+def _contradicted(found: Mapping[str, Explanation]) -> dict[str, str]:
+    """The values of bodies of which joints say different things, each with what they say."""
+    said: dict[str, dict[str, dict[str, float]]] = {}
+    for joint, told in found.items():
+        for key, moved in _moved(told).items():
+            if key.startswith("body/"):
+                own = said.setdefault(key.split("/")[1], {})
+                own.setdefault(joint, {})[key] = float(moved.value)
+    texts = {}
+    for own in said.values():
+        if any(values != next(iter(own.values())) for values in own.values()):
+            for key in dict.fromkeys(key for values in own.values() for key in values):
+                each = [f"{own[j][key]:.5g} by {j}" for j in own if key in own[j]]
+                texts[key] = f"the joints contradict each other on its body ({', '.join(each)})"
+    return texts
 
 
 def _label(key: str) -> str:
