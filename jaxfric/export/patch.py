@@ -17,7 +17,7 @@ from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..simulators import Mujoco, actuation
 from ..simulators.loading import library
-from ..simulators.patching import folder_of, patched
+from ..simulators.patching import Patched, folder_of, patched
 from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
@@ -117,16 +117,7 @@ def patch(
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
-    errors = _read_again(source, done.text, found, recordings, models)
-    if worse := [joint for joint, each in errors.items() if _worse(each)]:
-        kept = {key: to for key, (_, to) in values.items() if not key.startswith("body/")}
-        why = "; ".join(
-            f"joint {joint} would be worse: {_from_to(errors[joint])}" for joint in worse
-        )
-        gone = {key: why for key in done.written if key.startswith("body/")}
-        done = patched(library(), source, kept)
-        done = done._replace(left={**done.left, **gone})
-        errors = _read_again(source, done.text, found, recordings, models)
+    done, errors = _without_harm(source, done, values, found, recordings, models)
     written = [
         f"{_label(key)}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written
     ]
@@ -138,6 +129,27 @@ def patch(
     misses = tuple(_miss(joint, told, errors[joint]) for joint, told in found.items())
     patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+def _without_harm(
+    source, done: Patched, values, found, recordings, models
+) -> tuple[Patched, dict[str, dict[str, Any]]]:
+    """The file without values that make a joint worse than it was, first those of bodies, then the
+    joint's own; and the force errors of all joints by it.
+    """
+    errors = _read_again(source, done.text, found, recordings, models)
+    for own in (False, True):
+        worse = [joint for joint, each in errors.items() if _worse(each)]
+        mine = {key for joint in worse for key in _moved(found[joint])}
+        harm = [k for k in done.written if (k in mine if own else k.startswith("body/"))]
+        if not worse or not harm:
+            continue
+        said = [f"joint {joint} would be worse: {_from_to(errors[joint])}" for joint in worse]
+        kept = {key: values[key][1] for key in done.written if key not in harm}
+        left = {**done.left, **dict.fromkeys(harm, "; ".join(said))}
+        done = patched(library(), source, kept)._replace(left=left)
+        errors = _read_again(source, done.text, found, recordings, models)
+    return done, errors
 
 
 def _contradicted(found: Mapping[str, Explanation]) -> dict[str, str]:
