@@ -10,7 +10,6 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..explanation import Explanation
-from ..explanation.acceptance import LINEARITY
 from ..explanation.attributes import CONSTANT, GAIN
 from ..explanation.errors import through_kernel
 from ..identification.uncertainty import Estimate
@@ -24,6 +23,7 @@ from ..terms.base import Sum, summands
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
+from .errors import from_to, miss, reached, worse
 from .rerun import Rerun, rerun
 
 
@@ -126,7 +126,7 @@ def patch(
         for joint, model in models.items()
     ]
     left += [f"{_label(key)} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
-    misses = tuple(_miss(joint, told, errors[joint]) for joint, told in found.items())
+    misses = tuple(miss(joint, told, errors[joint]) for joint, told in found.items())
     patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
 
@@ -139,12 +139,12 @@ def _without_harm(
     """
     errors = _read_again(source, done.text, found, recordings, models)
     for own in (False, True):
-        worse = [joint for joint, each in errors.items() if _worse(each)]
-        mine = {key for joint in worse for key in _moved(found[joint])}
+        joints = [joint for joint, each in errors.items() if worse(each)]
+        mine = {key for joint in joints for key in _moved(found[joint])}
         harm = [k for k in done.written if (k in mine if own else k.startswith("body/"))]
-        if not worse or not harm:
+        if not joints or not harm:
             continue
-        said = [f"joint {joint} would be worse: {_from_to(errors[joint])}" for joint in worse]
+        said = [f"joint {joint} would be worse: {from_to(errors[joint])}" for joint in joints]
         kept = {key: values[key][1] for key in done.written if key not in harm}
         left = {**done.left, **dict.fromkeys(harm, "; ".join(said))}
         done = patched(library(), source, kept)._replace(left=left)
@@ -188,40 +188,6 @@ def _read_again(source, text: str, found, recordings, models) -> dict[str, dict[
         )
         errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
     return errors
-
-
-def reached(error: Mapping[str, float]) -> float:
-    """The force error with all that was written: the file, and the forces beside it if any."""
-    return error.get("forces", error["file"])
-
-
-def _more(one: float, other: float) -> bool:
-    """Whether an error, relative to the force, is more than another beyond what a sensor tells."""
-    return one**2 > other**2 + LINEARITY**2
-
-
-def _worse(errors: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether what was written leaves a joint more than the file as it was, on any recording."""
-    return any(_more(reached(each), each["before"]) for each in errors.values())
-
-
-def _from_to(errors: Mapping[str, Mapping[str, float]]) -> str:
-    """Errors before and after in words."""
-    return ", ".join(
-        f"{each['before']:.2%} → {reached(each):.2%}{' held out' * name.startswith('holdout')}"
-        for name, each in errors.items()
-    )
-
-
-def _miss(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]]) -> str:
-    """That what was written leaves more of a joint's force than its answer does, if it does."""
-    texts = []
-    for name, each in errors.items():
-        own = told.fit[f"filtered_{name}"]
-        if own and _more(reached(each), own["after"]):
-            held = "of the held-out recording " if name.startswith("holdout") else ""
-            texts.append(f"{held}{own['after']:.2%} by its answer, {reached(each):.2%} by the file")
-    return f"joint {joint}: not all of its answer is in the file: {'; '.join(texts)}" * bool(texts)
 
 
 def _commanded(recording: Recording) -> bool:
