@@ -296,10 +296,15 @@ def test_the_command_puts_the_simulators_file_right(tmp_path, capsys):
     command = ["explain", logs[0], "--holdout", logs[1], "--mujoco", str(tmp_path / "arm.xml")]
     assert cli.main([*command, "--save", out["new.xml"], "--json", out["out.json"]]) == 0
     said = capsys.readouterr().out
-    assert "elbow: body forearm: mass 1.2 → 1.6" in said and "shoulder: judged with" in said
+    mass = (
+        "shoulder and elbow together: body forearm: mass with its inertia in proportion 1.2 → 1.6"
+    )
+    assert " ".join(said.split()).count(mass) == 1
     document = json.loads((tmp_path / "out.json").read_text())
     assert [row["joint"] for row in document["joints"]] == ["shoulder", "elbow"]
-    assert [row["verdict"] for row in document["joints"]] == ["consistent", "explained"]
+    assert [row["verdict"] for row in document["joints"]] == ["explained", "explained"]
+    values = [row["explanation"]["findings"][0]["parameters"] for row in document["joints"]]
+    assert values[0] == values[1] and list(values[0]) == ["body/forearm/mass"]
     for errors in document["patch"]["errors"].values():
         assert errors["holdout_force_error"]["file"] < 0.02 < errors["force_error"]["before"]
     lines = set((tmp_path / "new.xml").read_text().splitlines()) - set(nominal.splitlines())

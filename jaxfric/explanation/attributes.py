@@ -234,14 +234,14 @@ def _doubt(
     impossible = key in own and own[key].what.split()[0] in POSITIVE and m.value < 0
     texts = ["which cannot be below zero"] if impossible else []
     if alike:
-        said = _listed(alike, f"{len(alike) - MOST} others")
+        said = listed(alike, f"{len(alike) - MOST} others")
         texts.append(f"or {said}: no motion of this joint tells them apart")
     if others := instead.get(key):
         names = [str(own[n]) if n in own else "a constant force" for n in others]
-        texts.append(f"or {_listed(names, 'others')}: this motion cannot tell them apart")
+        texts.append(f"or {listed(names, 'others')}: this motion cannot tell them apart")
     return f" ({'; '.join(texts)})" if texts else ""
 
 
-def _listed(names: Sequence[str], others: str) -> str:
+def listed(names: Sequence[str], others: str) -> str:
     """The first names of a list, and that there are others."""
     return " or ".join([*names[:MOST], *([others] if len(names) > MOST else [])])

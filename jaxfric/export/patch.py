@@ -16,12 +16,14 @@ from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..simulators import Mujoco, actuation
 from ..simulators.loading import library
-from ..simulators.patching import folder_of, patched
+from ..simulators.patching import Patched, folder_of, patched
+from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import Sum, summands
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback
+from .errors import from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
 from .rerun import Rerun, rerun
@@ -48,7 +50,8 @@ class Patch(NamedTuple):
       file's name.
     - `written` and `left`: what was changed, and what was not and why, a line each.
     - `errors`: force errors through the kernel of the explanation, by recording ("force_error",
-      "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it.
+      "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it; from
+      the file as it was read again. `misses`: where that is more than the joint's answer leaves.
     """
 
     text: str
@@ -57,14 +60,19 @@ class Patch(NamedTuple):
     left: list[str]
     errors: dict[str, dict[str, dict[str, float]]]
     module: str
+    misses: tuple[str, ...] = ()
     rerun: Rerun = Rerun()
 
     def to_dict(self) -> dict[str, Any]:
         """What was done as plain data, without the texts."""
         return {
             "written": self.written, "left": self.left, "errors": self.errors,
-            "rerun": self.rerun.to_dict(),
+            "misses": list(self.misses), "rerun": self.rerun.to_dict(),
         }  # fmt: skip
+
+    def after(self, joint: str) -> dict[str, float]:
+        """What the file leaves of a joint's force, with the forces beside it, by recording."""
+        return {name: reached(each) for name, each in self.errors[joint].items()}
 
 
 def patch(
@@ -76,9 +84,11 @@ def patch(
 ) -> Patch:
     """The simulator's file with the findings of its joints.
 
-    **Arguments:** `source`, the file; by joint, the outermost last: the explanations, each of which
-    takes the bodies as those farther out have corrected them, and the recordings (the first is the
-    one explained, the second held out); `name` of the file to be, for the module beside it;
+    The file is read again as it was written. Values of bodies with which a joint is worse than
+    before, on any recording, are not written.
+
+    **Arguments:** `source`, the file; by joint the explanations, and the recordings (the first is
+    the one explained, the second held out); `name` of the file to be, for the module beside it;
     `again`, what a closed loop needs to be run again.
     """
     values: dict[str, tuple[float, float]] = {}
@@ -93,16 +103,10 @@ def patch(
             elif key != CONSTANT:
                 before, _ = values.get(key, (float(moved.before), 0.0))
                 values[key] = before, float(moved.value)
-    compared = _Compared(source, found, recordings)
-    owners = list(dict.fromkeys(map(_owner, values)))
-    good = kept(owners, lambda some: compared.held(_of(values, some)))
-    left += [
-        f"{key} → {to:.5g}: {WORSE}" for key, (_, to) in values.items() if _owner(key) not in good
-    ]
-    values = _of(values, good)
+    apart = _contradicted(found)
+    left += [f"{_label(key)}: {why}" for key, why in apart.items()]
+    values = {key: pair for key, pair in values.items() if key not in apart}
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
-    written = [f"{key}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written]
-    left += [f"{key} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
     beside = {joint: _beside(told) for joint, told in found.items()}
     models: dict[str, Model] = {}
     for joint, model in beside.items():
@@ -110,62 +114,109 @@ def patch(
         left += [
             f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
         ]
-        good = kept(able, lambda some, j=joint, m=model: compared.beside(done.text, j, m, some))
+        good = _confirmed(source, done.text, joint, found[joint], recordings[joint], model, able)
         left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]
         if good:
             models[joint] = callback.only(model, good)
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
+    done, errors = _without_harm(source, done, values, found, recordings, models)
+    written = [
+        f"{_label(key)}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written
+    ]
     written += [
         f"{module}: joint {joint}: {', '.join(p.name for p in callback.parts(model))}"
         for joint, model in models.items()
     ]
-    errors = {joint: compared.errors(done.text, joint, models.get(joint)) for joint in found}
-    patch = Patch(done.text, forces, written, left, errors, module)
+    left += [f"{_label(key)} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
+    misses = tuple(miss(joint, told, errors[joint]) for joint, told in found.items())
+    patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
 
 
-# Why something is not written.
+# Why a force is not written.
 WORSE = "the held-out recording is worse with it"
 
 
-def _owner(key: str) -> str:
-    """What a value belongs to: those of one joint, actuator or body are written together."""
-    return key.rpartition("/")[0]
+def _confirmed(
+    source, text: str, joint: str, told: Explanation, recordings, model, able: Sequence[Part]
+) -> list[Part]:
+    """The forces of a joint beside the file that make its held-out recording no worse."""
+    if model is None or len(recordings) < 2 or not able:
+        return list(able)
 
+    pair = _pair(source, text, joint, recordings, {})
 
-def _of(values: Mapping[str, tuple[float, float]], owners: Sequence[str]):
-    return {key: pair for key, pair in values.items() if _owner(key) in owners}
-
-
-class _Compared:
-    """The force errors of a model's text, by the explanations and recordings of its joints."""
-
-    def __init__(self, source: str | Path, found: Mapping[str, Explanation], recordings):
-        self.source, self.found, self.recordings = source, found, recordings
-        self.shared: dict[bytes, Any] = {}
-
-    def errors(self, text: str, joint: str, forces: Model | None = None, first: int = 0):
-        """Of one joint, by recording from the `first` on."""
-        logs = self.recordings[joint]
-        commanded = _commanded(logs[0])
-        before = Mujoco(self.source, joint, shared=self.shared, commanded=commanded)
-        after = Mujoco(text, joint, folder_of(self.source), self.shared, commanded=commanded)
-        return _errors(self.found[joint], before, after, logs, forces, first)
-
-    def held(self, values: Mapping[str, tuple[float, float]]) -> list[float]:
-        """Of all joints on their held-out recordings, with some values in the file."""
-        text = patched(library(), self.source, {k: to for k, (_, to) in values.items()}).text
-        held = [joint for joint in self.found if len(self.recordings[joint]) > 1]
-        return [self.errors(text, joint, None, 1)[HELD]["file"] for joint in held]
-
-    def beside(self, text: str, joint: str, model: Model, some: Sequence[Part]) -> list[float]:
-        """Of one joint on its held-out recording, with some forces beside the file."""
-        if len(self.recordings[joint]) < 2:
-            return []
+    def errors(some: Sequence[Part]) -> list[float]:
         forces = callback.only(model, some) if some else None
-        return [self.errors(text, joint, forces, 1)[HELD]["forces" if some else "file"]]
+        return [reached(_errors(told, *pair, recordings, forces)[HELD])]
+
+    return kept(able, errors)
+
+
+def _without_harm(
+    source, done: Patched, values, found, recordings, models
+) -> tuple[Patched, dict[str, dict[str, Any]]]:
+    """The file without values that make a joint worse than it was, first those of bodies, then the
+    joint's own; and the force errors of all joints by it.
+    """
+    errors = _read_again(source, done.text, found, recordings, models)
+    for own in (False, True):
+        joints = [joint for joint, each in errors.items() if worse(each)]
+        mine = {key for joint in joints for key in _moved(found[joint])}
+        harm = [k for k in done.written if (k in mine if own else k.startswith("body/"))]
+        if not joints or not harm:
+            continue
+        said = [f"joint {joint} would be worse: {from_to(errors[joint])}" for joint in joints]
+        kept = {key: values[key][1] for key in done.written if key not in harm}
+        left = {**done.left, **dict.fromkeys(harm, "; ".join(said))}
+        done = patched(library(), source, kept)._replace(left=left)
+        errors = _read_again(source, done.text, found, recordings, models)
+    return done, errors
+
+
+def _contradicted(found: Mapping[str, Explanation]) -> dict[str, str]:
+    """The values of bodies of which joints say different things, each with what they say."""
+    said: dict[str, dict[str, dict[str, float]]] = {}
+    for joint, told in found.items():
+        for key, moved in _moved(told).items():
+            if key.startswith("body/"):
+                own = said.setdefault(key.split("/")[1], {})
+                own.setdefault(joint, {})[key] = float(moved.value)
+    texts = {}
+    for own in said.values():
+        if any(values != next(iter(own.values())) for values in own.values()):
+            for key in dict.fromkeys(key for values in own.values() for key in values):
+                each = [f"{own[j][key]:.5g} by {j}" for j in own if key in own[j]]
+                texts[key] = f"the joints contradict each other on its body ({', '.join(each)})"
+    return texts
+
+
+def _label(key: str) -> str:
+    """A value's name, with what of the body goes along with it."""
+    if key.endswith(f"/{MASS_ALONE}"):
+        return key.removesuffix(MASS_ALONE) + MASS
+    return f"{key} (its inertia in proportion)" if key.endswith(f"/{MASS}") else key
+
+
+def _read_again(source, text: str, found, recordings, models) -> dict[str, dict[str, Any]]:
+    """The force errors of all joints by the file as it was written, see `Patch.errors`."""
+    errors: dict[str, dict[str, Any]] = {}
+    shared: dict[bytes, Any] = {}
+    for joint, told in found.items():
+        pair = _pair(source, text, joint, recordings[joint], shared)
+        errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
+    return errors
+
+
+def _pair(source, text: str, joint: str, recordings, shared) -> tuple[Mujoco, Mujoco]:
+    """The simulators of a joint by the file as it was, and by a text."""
+    commanded = _commanded(recordings[0])
+    return (
+        Mujoco(source, joint, shared=shared, commanded=commanded),
+        Mujoco(text, joint, folder_of(source), shared, commanded=commanded),
+    )
 
 
 def _commanded(recording: Recording) -> bool:
@@ -236,8 +287,11 @@ def _acting(told: Explanation) -> tuple[float, float, float, float]:
 
 
 def _moved(told: Explanation):
-    found = next((f for f in told.findings if f.effect == MISMATCH), None)
-    return {} if found is None else found.parameters
+    found: dict[str, Any] = {}
+    for finding in told.findings:
+        if finding.effect == MISMATCH:
+            found |= finding.parameters
+    return found
 
 
 def _unwritten(joint: str, moved) -> str:
@@ -274,13 +328,11 @@ HELD = "holdout_force_error"
 FIGURES = ("force_error", HELD)
 
 
-def _errors(
-    told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None, first: int
-):
+def _errors(told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None):
     """The force errors through the kernel: before, of the file, and with the forces beside it."""
     delay = told.fit["filtered_force_error"]["force_taken_later"]
     found = {}
-    for name, log in list(zip(FIGURES, recordings, strict=False))[first:]:
+    for name, log in zip(FIGURES, recordings, strict=False):
         made = _made(before, after, log)
         error = {
             "before": through_kernel(before.baseline(log.units), before.beside(log), delay),

@@ -309,23 +309,36 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         if "error" in row:
             table.append([row["joint"], row["verdict"], *[""] * 4, "see below"])
             continue
-        errors = [row["filtered_force_error"], row["filtered_holdout_force_error"]]
+        errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
         cells = [f"{e[w]:.2%}" if e else "" for e in errors for w in ("before", "after")]
         table.append([row["joint"], row["verdict"], *cells, "see below" * bool(row["findings"])])
     lines = [f"{printable(simulator)} against {printable(log)}", ""]
     lines += aligned(table, (2, 3, 4, 5))
+    every = [each for row in rows for each in row.get("findings", ())]
+    shared = {each for each in every if every.count(each) > 1}  # said of several joints together
+    lines += [
+        line for each in dict.fromkeys(every) if each in shared for line in ["", *wrapped(each)]
+    ]
     for row in rows:
         said = [row["error"]] if "error" in row else row["findings"]
         for each in said:
-            lines += ["", *wrapped(f"{row['joint']}: {each}")]
+            lines += [] if each in shared else ["", *wrapped(f"{row['joint']}: {each}")]
         if row.get("corrected_before"):
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):
             lines += ["", *wrapped(f"{row['joint']}: {each}")]
     for each in dict.fromkeys(note for row in rows for note in row.get("still", ())):
         lines += ["", *wrapped(each)]
-    lines += ["", "Force errors through the kernel by which effects are looked for."]
+    after = " After: of the file as it was written." * any("file" in row for row in rows)
+    lines += ["", f"Force errors through the kernel by which effects are looked for.{after}"]
     return "\n".join(lines)
+
+
+def _with_file(row: Mapping[str, Any], name: str) -> Mapping[str, float] | None:
+    """A joint's errors before and after; after by the written file, where there is one."""
+    error = row[f"filtered_{name}"]
+    written = row.get("file", {}).get(name)
+    return error if written is None or error is None else {**error, "after": written}
 
 
 def patch(path: str, document: Mapping[str, Any]) -> str:
@@ -340,7 +353,10 @@ def patch(path: str, document: Mapping[str, Any]) -> str:
             held = "held out" if name.startswith("holdout") else "recording"
             cells = [f"{error[w]:.2%}" if w in error else "" for w in ("before", "file", "forces")]
             table.append([f"{joint}, {held}", *cells])
-    lines += ["", *aligned(table, (1, 2, 3)), *_rerun(document["rerun"])]
+    lines += ["", *aligned(table, (1, 2, 3))]
+    for line in document["misses"]:
+        lines += ["", *wrapped(line)]
+    lines += _rerun(document["rerun"])
     return "\n".join(lines)
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import actuation, rigid
+from . import actuation, rigid, weights
 from .actuation import Actuator
 from .inverse import Along, Motion, along, weighed, with_friction
 from .known import Attribute
@@ -37,11 +37,13 @@ class Columns(NamedTuple):
 
 
 def distinct(
-    mujoco: Any, model: Any, joint: int, name: str, actuator: Actuator | None = None
-) -> Columns:
+    mujoco: Any, model: Any, joint: int, name: str, actuator: Actuator | None = None,
+    settled: bool = False,
+) -> Columns:  # fmt: skip
     """The parameters that a joint's force depends on, one for each that no motion tells apart.
 
-    `actuator`: where the log is of its command, whose own values then show too.
+    `actuator`: where the log is of its command, whose own values then show too; `settled`: without
+    those of bodies, which all joints together have told.
     """
     every = {**_of_joint(mujoco, model, joint, name), **_of_bodies(mujoco, model, joint)}
     if actuator is not None:
@@ -64,6 +66,8 @@ def distinct(
         else:
             own = attributes[twin]
             attributes[twin] = own._replace(alike=(*own.alike, str(attribute)))
+    if settled:
+        attributes = {key: each for key, each in attributes.items() if key[:5] != "body/"}
     makers = {key: every[key][1] for key in attributes}
     if actuator is None or not actuator.constant:
         return Columns(attributes, makers)
@@ -132,7 +136,7 @@ def _of_bodies(mujoco: Any, model: Any, joint: int):
     for body in range(1, model.nbody):
         if model.body_mass[body] <= 0 or joint not in _moved_by(model, body):
             continue
-        label = model.body(body).name or f"body{body}"
+        label = weights.label(model, body)
         own = weighed(mujoco, model, body)
         values = {"mass": own[0], **_lettered("centre", own[1]), **_lettered("inertia", own[2])}
         for what, slope in rigid.slopes(*own).items():
@@ -142,6 +146,11 @@ def _of_bodies(mujoco: Any, model: Any, joint: int):
             maker = _body(slope, body, joint, model.opt.gravity)
             found[f"body/{label}/{what}"] = (attribute, maker)
     return found
+
+
+def moved(model: Any, joint: int) -> set[str]:
+    """The names of the bodies that a joint moves."""
+    return {weights.label(model, b) for b in range(1, model.nbody) if joint in _moved_by(model, b)}
 
 
 def _lettered(what: str, values) -> dict[str, float]:

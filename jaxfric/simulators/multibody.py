@@ -41,7 +41,8 @@ class Mujoco(AbstractSimulator):
     meshes of a model that is given as text lie; `shared`, a memory for several joints of one log;
     `zeros`, where the encoders' zeros are in the model's angles, rad or m by joint; `commanded`:
     the log is of the command of the joint's actuator (MuJoCo's `ctrl`), and its recordings are
-    passed through `driven` first. Then the actuator's bias, gain and time constant are columns too.
+    passed through `driven` first. Then the actuator's bias, gain and time constant are columns too;
+    `settled`: the bodies have been told by all joints together, and are no columns.
 
     Nothing is compared where the joint is at a limit of the model, or bodies of it touch.
 
@@ -57,6 +58,7 @@ class Mujoco(AbstractSimulator):
         shared: dict[bytes, Any] | None = None,
         zeros: Mapping[str, float] | None = None,
         commanded: bool = False,
+        settled: bool = False,
     ):
         self.mujoco, self._source, self._folder = library(), str(model), folder
         self._shared = {} if shared is None else shared
@@ -79,9 +81,10 @@ class Mujoco(AbstractSimulator):
                 f"The model has no joint {joint!r}. Its joints are {', '.join(self.joints)}."
             )
         self.joint, self.number = joint, self.joints.index(joint)
+        self.settled = settled
         own = actuation.read(self.mujoco, self.model, self.number) if commanded else None
         self.actuator: actuation.Actuator | None = own
-        self.columns = columns.distinct(self.mujoco, self.model, self.number, joint, own)
+        self.columns = columns.distinct(self.mujoco, self.model, self.number, joint, own, settled)
 
     def __call__(self, recording: Recording) -> Float[np.ndarray, " N"]:
         """The generalised force at the joint, N or N·m, `(N,)`."""
@@ -99,6 +102,10 @@ class Mujoco(AbstractSimulator):
     def attributes(self) -> Mapping[str, Attribute]:
         """The model's parameters that the joint's force tells of, by the corrections' names."""
         return self.columns.attributes
+
+    def bodies(self) -> set[str]:
+        """The names of the bodies that the joint moves."""
+        return columns.moved(self.model, self.number)
 
     def beside(self, recording: Recording, held_out: bool = False) -> Recording:
         """The recording with the model's force and what each parameter adds, as channels."""
@@ -164,7 +171,8 @@ class Mujoco(AbstractSimulator):
         """What the force along a motion depends on."""
         logs = [self._position(recording, name) for name in self.joints]
         zeros = repr(sorted(self.zeros.items()))
-        own = hashlib.sha256(f"{self._source} {zeros} {self.actuator}".encode()).digest()
+        known = f"{self._source} {zeros} {self.actuator} {self.settled}"
+        own = hashlib.sha256(known.encode()).digest()
         return own + self._places(logs)
 
     @staticmethod
@@ -202,8 +210,10 @@ class Mujoco(AbstractSimulator):
     def with_zeros(self, zeros: Mapping[str, float]) -> "Mujoco":
         """The same simulator with other zeros of the joints' encoders: their attribute `ref`."""
         zeros = {**self.zeros, **zeros}
-        commanded = self.actuator is not None
-        return Mujoco(self._source, self.joint, self._folder, self._shared, zeros, commanded)
+        return Mujoco(
+            self._source, self.joint, self._folder, self._shared, zeros,
+            self.actuator is not None, self.settled,
+        )  # fmt: skip
 
     @property
     def standing(self) -> list[str]:

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import actuators
-from .inverse import weighed
 from .loading import is_hinge, is_text, joints_of, read
 from .tags import Bodies, Tag, bodies, edited, number as _number, tags
+from .weights import MASS, label, weight_of
 
 # What a file's number may differ from the value that it stands for, relative.
 ROUNDING = 1e-5
@@ -45,6 +45,18 @@ def patched(
         text = changed
         written += group
     return Patched(text, tuple(written), left)
+
+
+def with_inertial(mujoco: Any, source: str | Path) -> set[str]:
+    """The names of the bodies whose mass and inertia stand apart in the file, in an `inertial`; of
+    others, which geoms weigh, the inertia goes along with the mass.
+    """
+    tree = bodies(tags(_text(mujoco, source)))
+    model = read(mujoco, source)
+    if len(tree.bodies) != model.nbody - 1:
+        return set()
+    every = enumerate(tree.children, 1)
+    return {label(model, body) for body, children in every if children["inertial"]}
 
 
 def _text(mujoco: Any, source: str | Path) -> str:
@@ -96,7 +108,7 @@ def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> 
         changes, renamed = actuators.changed(mujoco, model, owner, own, found)
         return edited(text, changes, new, renamed)
     else:
-        body = next(b for b in range(1, model.nbody) if (model.body(b).name or f"body{b}") == owner)
+        body = next(b for b in range(1, model.nbody) if label(model, b) == owner)
         _of_body(mujoco, model, body, own, found, tree, changes, new)
     return edited(text, changes, new)
 
@@ -131,10 +143,10 @@ def _in_degrees(found: list[Tag]) -> bool:
 
 def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, new) -> None:
     """The weight of a body: its geom's mass, or its `inertial`, there already or added."""
-    mass, centre, inertia, _ = _wanted(mujoco, model, body, own)
+    mass, centre, inertia, _ = weight_of(mujoco, model, body).with_values(own)
     children = tree.children[body - 1]
     geoms = children["geom"]
-    if set(own) == {"mass"} and not children["inertial"] and len(geoms) == 1:
+    if set(own) == {MASS} and not children["inertial"] and len(geoms) == 1:
         if "mass" in found[geoms[0]].attributes:
             changes[geoms[0]] = {"mass": _number(mass)}
             return
@@ -145,8 +157,8 @@ def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, 
     }
     if children["inertial"]:
         tag = found[children["inertial"][0]]
-        kept = {} if set(own) - {"mass"} else {"pos"}
-        if "fullinertia" in tag.attributes:
+        kept = _as_it_was(own)
+        if "fullinertia" in tag.attributes and "diaginertia" not in kept:
             written |= {"fullinertia": None, "quat": _quat(model, body)}
         changes[children["inertial"][0]] = {k: v for k, v in written.items() if k not in kept}
         return
@@ -155,21 +167,15 @@ def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, 
     new[tree.bodies[body - 1]] = f"<inertial {inner}/>"
 
 
+def _as_it_was(own: Mapping[str, float]) -> set[str]:
+    """The attributes of an `inertial` that values of a body leave alone."""
+    changed = {name.partition("_")[0] for name in own} | ({"inertia"} if MASS in own else set())
+    attributes = {"mass": "mass", "centre": "pos", "inertia": "diaginertia"}
+    return {name for what, name in attributes.items() if what not in changed}
+
+
 def _quat(model: Any, body: int) -> str:
     return " ".join(map(_number, model.body_iquat[body]))
-
-
-def _wanted(mujoco: Any, model: Any, body: int, own: Mapping[str, float]):
-    """Mass, centre and principal inertias, with the values that are given: the mass first."""
-    mass, centre, inertia, axes = weighed(mujoco, model, body)
-    if "mass" in own:
-        mass, inertia = own["mass"], inertia * own["mass"] / mass
-    if mass <= 0:
-        raise ValueError("it would be below zero")
-    for k, letter in enumerate("xyz"):
-        centre[k] = own.get(f"centre_{letter}", centre[k])
-        inertia[k] = own.get(f"inertia_{letter}", inertia[k])
-    return mass, centre, inertia, axes
 
 
 def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
@@ -188,9 +194,12 @@ def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
         elif kind == "actuator":
             read_back = actuators.value(mujoco, new, owner, what)
         else:
-            body = next(b for b in range(1, new.nbody) if (new.body(b).name or f"body{b}") == owner)
-            whole = _wanted(mujoco, old, body, {k.split("/")[2]: v for k, v in group.items()})
-            there = weighed(mujoco, new, body)
+            body = next(b for b in range(1, new.nbody) if label(new, b) == owner)
+            own = {k.split("/")[2]: v for k, v in group.items()}
+            whole, there = (
+                weight_of(mujoco, old, body).with_values(own),
+                weight_of(mujoco, new, body),
+            )
             same = (
                 np.isclose(there[0], whole[0], rtol=ROUNDING)
                 and np.allclose(there[1], whole[1], rtol=ROUNDING, atol=ROUNDING)

@@ -1,0 +1,79 @@
+"""A robot's bodies by all of its joints: one value of each, and the joints again with it."""
+
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+
+from ..explanation.acceptance import LINEARITY
+from ..explanation.agreement import Agreement, Told, agreed, with_bodies
+from ..explanation.sanity import CheckedSimulator
+from ..simulators.loading import library
+from ..simulators.patching import folder_of, patched, with_inertial
+from ..terms.effects.parameter_mismatch import MISMATCH
+from .robot_joints import Joint, explained
+
+
+def together(
+    opened: Mapping[str, Joint], found: Sequence[Joint],
+    checked: Mapping[str, CheckedSimulator], shared, arguments: Namespace,
+) -> list[Joint]:  # fmt: skip
+    """The joints with one answer for the bodies that they move.
+
+    Where a joint by itself finds values of bodies wrong, all joints are asked for the fewest such
+    values that explain them all; with these the joints are explained again, each by what is its
+    own. Where the file does not take the values, or a joint is left with clearly more than by its
+    own answer, the joints' own answers stand: what they contradict each other in is not written.
+    """
+    able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
+    if not any(_of_bodies(joint) for joint in able):
+        return list(found)
+    mujoco = library()
+    told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
+    agreement = agreed(told, with_inertial(mujoco, arguments.mujoco))
+    done = patched(mujoco, arguments.mujoco, agreement.values(), folder_of(arguments.mujoco))
+    if done.left:
+        return list(found)
+    source = done.text if agreement.parameters else arguments.mujoco
+    names = [joint.name for joint in able]
+    again = []
+    for joint in found:
+        if joint in able and (_of_bodies(joint) or _moves(joint, agreement)):
+            new = explained(opened[joint.name], checked, source, shared, arguments, settled=True)
+            if _clearly_more(new, joint):
+                return list(found)
+            joint = _joined(joint, new, agreement, names)
+        again.append(joint)
+    return again
+
+
+def _clearly_more(new: Joint, own: Joint) -> bool:
+    """Whether an answer leaves more of a joint's force than its own does, on every recording, by
+    more than a sensor of force resolves.
+    """
+    if new.told is None or own.told is None:
+        return True
+    names = ("filtered_force_error", "filtered_holdout_force_error")
+    pairs = [(new.told.fit[n], own.told.fit[n]) for n in names if own.told.fit[n]]
+    return all(a["after"] ** 2 > b["after"] ** 2 + LINEARITY**2 for a, b in pairs)
+
+
+def _of_bodies(joint: Joint) -> list[str]:
+    """The values of bodies that a joint by itself finds wrong."""
+    findings = joint.told.findings if joint.told else []
+    return [
+        key for f in findings if f.effect == MISMATCH for key in f.parameters if key[:5] == "body/"
+    ]
+
+
+def _moves(joint: Joint, agreement: Agreement) -> bool:
+    """Whether a joint moves one of the bodies whose values are wrong."""
+    bodies = {key.split("/")[1] for key in agreement.parameters}
+    return joint.simulator is not None and bool(bodies & joint.simulator.bodies())
+
+
+def _joined(first: Joint, new: Joint, agreement: Agreement, names: Sequence[str]) -> Joint:
+    """A joint explained again, with what all say of its bodies before it."""
+    if new.told is None or first.told is None:
+        return first
+    if not _moves(first, agreement):
+        return new
+    return new._replace(told=with_bodies(new.told, first.told, agreement, names))

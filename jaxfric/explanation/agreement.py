@@ -1,0 +1,183 @@
+"""What all joints of a robot say of its bodies together, beside what each says by itself."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
+
+import jax
+
+from ..data.recording import Recording
+from ..models import Model
+from ..simulators import Attribute, Mujoco
+from ..simulators.weights import MASS, attribute, weights
+from ..terms.effects import EFFECTS
+from ..terms.effects.parameter_mismatch import MISMATCH
+from . import parameters as spelled
+from .acceptance import LINEARITY
+from .attributes import CONSTANT, GAIN, listed
+from .bodies import Bodies, State
+from .explained import Explanation
+from .fewest_numbers import answer
+from .finding import Finding, Moved
+from .joint_rows import joint_rows
+from .quantities import quantity
+from .sanity.preceding import p_value, with_preceding
+
+
+class Told(NamedTuple):
+    """One joint: its simulator as given, its recordings (the one explained, and the held-out one if
+    there is one), and its own explanation.
+    """
+
+    simulator: Mujoco
+    logs: Sequence[Recording]
+    explanation: Explanation
+
+
+class Agreement(NamedTuple):
+    """The values of bodies that all joints together say are wrong: `parameters` by name, `text` in
+    words, `instead` what else would do as well in place of each.
+    """
+
+    parameters: dict[str, Moved]
+    text: str
+    instead: dict[str, tuple[str, ...]]
+
+    def values(self) -> dict[str, float]:
+        """The values by name."""
+        return {name: float(moved.value) for name, moved in self.parameters.items()}
+
+
+def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
+    """What several joints say of the bodies that move with them.
+
+    The values are those of the recordings; the held-out ones, and a kernel of twice the width, say
+    only how well they are known. `apart`: bodies whose mass and inertia are numbers apart from each
+    other in the simulator's file.
+    """
+    simulator = told[0].simulator
+    bodies = weights(simulator.mujoco, simulator.model)
+    with jax.enable_x64(True):
+        rows = _rows(told, bodies)
+        found = answer(rows, apart)
+        values = {n: v for n, v in found.values.items() if n in rows.owner}
+        known = {name: found.estimates[name] for name in values}
+        for more, joined in ((_rows(told, bodies, wide=2), spelled.with_smoothing),
+                             (_rows(told, bodies, held=True), spelled.with_elsewhere)):  # fmt: skip
+            if values and more is not None:
+                _, there = more.fitted(found.values, found.values)
+                known = joined(known, more.estimates(there))
+    moved = {name: Moved(rows.before[name], known[name]) for name in values}
+    return Agreement(moved, _text(moved, found.instead, rows, told), found.instead)
+
+
+def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bodies | None:
+    """The rows of all joints, of the held-out recording where `held`; `None` without enough."""
+    if any(len(each.logs) <= held for each in told):
+        return None
+    found = []
+    for each in told:
+        model: Model = each.explanation.model
+        delay = each.explanation.fit["filtered_force_error"]["force_taken_later"]
+        log = each.logs[held]
+        try:
+            found.append(joint_rows(each.simulator, log, model, delay, LINEARITY, wide))
+        except ValueError:
+            if not held and wide == 1:
+                raise
+            return None
+    return Bodies(found, bodies)
+
+
+def with_bodies(
+    found: Explanation, first: Explanation, agreement: Agreement, joints: Sequence[str]
+) -> Explanation:
+    """A joint's explanation, its bodies put right, with what of them was wrong before it.
+
+    **Arguments:** `found`, by the simulator whose bodies are right; `first`, by the one as it was
+    given; `joints` that have told of the bodies together.
+    """
+    name = "filtered_force_error"
+    before, left = (each.fit[name]["before"] for each in (first, found))
+    part = (left / before) ** 2 if before > 0 else 1.0
+    share = max(1 - part, 0.0)
+    moved = agreement.parameters
+    together = f"{listed_and(joints)} together: " if len(joints) > 1 else ""
+    finding = Finding(
+        MISMATCH, EFFECTS[MISMATCH].equation,
+        f"Wrong in the simulator: {together}{agreement.text}; {share:.0%} of the unexplained "
+        "force.",
+        (), "", moved, share, _held_out_share(found, first),
+        max(p_value(m.change) for m in moved.values()),
+        attribute=", ".join(moved), confirmed=_confirmed(found, first),
+        instead={n: o for n, o in agreement.instead.items() if n in moved},
+    )  # fmt: skip
+    names = ("force_error", name, "holdout_force_error", "filtered_holdout_force_error")
+    errors = {n: first.fit[n]["before"] for n in names if first.fit[n] and found.fit[n]}
+    return with_preceding(found, [finding], part, errors)
+
+
+def _held_out_share(found: Explanation, first: Explanation) -> float | None:
+    name = "filtered_holdout_force_error"
+    if not (found.fit[name] and first.fit[name]):
+        return None
+    return 1 - (found.fit[name]["before"] / first.fit[name]["before"]) ** 2
+
+
+def _confirmed(found: Explanation, first: Explanation) -> bool | None:
+    share = _held_out_share(found, first)
+    return None if share is None else share > 0
+
+
+def listed_and(names: Sequence[str]) -> str:
+    """Names in a row: "a, b and c"."""
+    return " and ".join([*([", ".join(names[:-1])] if len(names) > 1 else []), names[-1]])
+
+
+def _text(
+    moved: Mapping[str, Moved], instead: Mapping[str, tuple[str, ...]], rows: Bodies,
+    told: Sequence[Told],
+) -> str:  # fmt: skip
+    """The wrong values in words, each with what would do as well."""
+    own = {each.simulator.joint: each.simulator.attributes() for each in told}
+    texts = []
+    for name, m in moved.items():
+        body, what = rows.owner[name]
+        value = attribute(rows.weights[body], body, what)
+        text = f"{value.owner}: {value.what} {m.before:.4g} → {quantity(m.estimate, smaller=False)}"
+        if others := instead.get(name):
+            said = dict.fromkeys(_said(other, rows, own) for other in others)
+            text += f" (or {listed(list(said), 'others')}: these motions cannot tell them apart)"
+        texts.append(text)
+    return "; ".join([*texts, *_raised(moved, rows)])
+
+
+def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -> str:
+    """A number that would do as well, in words."""
+    if name in rows.owner:
+        body, what = rows.owner[name]
+        return str(attribute(rows.weights[body], body, what))
+    joint, _, key = name.partition(":")
+    if key == CONSTANT or key not in own[joint]:
+        return f"a constant force at joint {joint}"
+    return (
+        f"gain of joint {joint}"
+        if key == GAIN and own[joint][key].what == GAIN
+        else str(own[joint][key])
+    )
+
+
+def _raised(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
+    """The inertias that go along because no body could be without."""
+    texts = []
+    for body, weight in rows.weights.items():
+        own: State = {rows.owner[n][1]: float(m.value) for n, m in moved.items()
+                      if rows.owner[n][0] == body}  # fmt: skip
+        new = weight.with_values(own)
+        times = new.mass / weight.mass if MASS in own else 1.0
+        for letter, i, before in zip("xyz", new.inertia, weight.inertia, strict=True):
+            if f"inertia_{letter}" not in own and i > before * times * (1 + 1e-9):
+                texts.append(
+                    f"body {body}: inertia {letter} {before:.4g} → {i:.4g} kg·m², the least that a "
+                    "body with the others can have: these motions do not show it"
+                )
+    return texts

@@ -1,0 +1,172 @@
+"""The fewest numbers of a robot's file that explain the forces of all its joints."""
+
+import itertools
+import sys
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..identification.uncertainty import Estimate
+from ..simulators.weights import MASS, MASS_ALONE
+from .bodies import Bodies, State
+from .least_squares import orthonormal
+from .mismatch import SURE
+
+# Sets of one number fewer to which each other number is added, and numbers that are tried with
+# each: those that would take most if all were linear. They bound the time: of one number all are
+# the best of 16, of more there are 128 fits for each number more.
+BEAM, TRIED = 8, 16
+# A number that adds less than this to the energy of the force, by a change of its own size, is not
+# seen but for rounding.
+UNSEEN = 1e-12
+
+
+class Answer(NamedTuple):
+    """What all joints say together: the values that differ by name, with `estimates`, and what else
+    would do as well in place of each, `instead`.
+    """
+
+    values: State
+    estimates: dict[str, Estimate]
+    instead: dict[str, tuple[str, ...]]
+
+
+def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
+    """The fewest numbers, how well they are known, and what else would do as well.
+
+    **Arguments:** `apart`: bodies whose mass and inertia are numbers apart from each other in the
+    file.
+    """
+    state = fewest(robot, apart)
+    return Answer(state, robot.estimates(state) if state else {}, _instead(robot, state))
+
+
+def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
+    """The fewest numbers that leave no joint more than all linear parameters do; of fewer bodies,
+    where one number more does for each body fewer: one part of a machine is wrong sooner than two.
+    """
+    found = _fewest(robot, frozenset(robot.weights), apart)
+    if np.any(robot.energies(found) - robot.least > robot.enough):
+        return found
+    bodies = sorted({robot.owner[n][0] for n in found if n in robot.owner})
+    for count in range(1, len(bodies)):
+        for some in itertools.combinations(bodies, count):
+            most = len(found) + len(bodies) - count
+            fewer = _fewest(robot, frozenset(some), apart, most)
+            if np.all(robot.energies(fewer) <= robot.energies(found) + robot.enough):
+                return fewer
+    return found
+
+
+def _fewest(
+    robot: Bodies, bodies: frozenset[str], apart: Collection[str], most: int = sys.maxsize
+) -> State:
+    """The fewest numbers of joints and those bodies that leave no more than all do, `most` at most.
+
+    Each of them beyond its noise; among sets that do as well, the one that changes least.
+    """
+    found, beam = State(), [State()]
+    while len(found) < most and np.any(robot.energies(found) - robot.least > robot.enough):
+        tried: dict[frozenset[str], tuple[float, State]] = {}
+        for state in beam:
+            for name in _promising(robot, state, bodies):
+                names = frozenset({*state, name})
+                if names not in tried:
+                    tried[names] = robot.fitted([*state, name], state)
+        best = sorted(tried.values(), key=lambda each: each[0])[:BEAM]
+        beam = [state for energy, state in best if np.isfinite(energy)]
+        sure = [state for state in beam if _sure(robot, state)]
+        if not sure:
+            break
+        alike = robot.energies(sure[0]) + robot.enough
+        sure = [state for state in sure if np.all(robot.energies(state) <= alike)]
+        found = min(sure, key=lambda state: _changed(robot, state, apart))
+    return found
+
+
+def _promising(robot: Bodies, state: State, bodies: frozenset[str]) -> list[str]:
+    """The numbers of joints and those bodies that would take most, were they linear."""
+    names = [n for n in _others(robot, state) if n in robot.place or robot.owner[n][0] in bodies]
+    slopes = robot.slopes(names, state)
+    rest = robot.pull - robot.gram @ robot.shift(state)
+    if state:
+        mine = robot.slopes(state, state)
+        inner = np.linalg.pinv(mine.T @ robot.gram @ mine, rcond=1e-12)
+        slopes = slopes - mine @ (inner @ (mine.T @ robot.gram @ slopes))
+    sizes = np.sum(slopes * (robot.gram @ slopes), axis=0)
+    own = np.array([robot.size(name) ** 2 for name in names])
+    seen = sizes * own > UNSEEN * robot.powers.sum()
+    gains = np.where(seen, (rest @ slopes) ** 2 / np.maximum(sizes, 1e-300), 0.0)
+    return [names[i] for i in np.argsort(-gains, kind="stable")[:TRIED] if gains[i] > 0]
+
+
+def _others(robot: Bodies, state: State) -> list[str]:
+    """The numbers beside a state's; of a body's mass no second one."""
+    owned = [robot.owner[name] for name in state if name in robot.owner]
+    weighed = [body for body, what in owned if what in (MASS, MASS_ALONE)]
+    twins = {f"body/{body}/{what}" for body in weighed for what in (MASS, MASS_ALONE)}
+    return [name for name in robot.before if name not in state and name not in twins]
+
+
+def _sure(robot: Bodies, state: State) -> bool:
+    """Whether each number of a state differs from the simulator's beyond noise."""
+    return all(
+        abs(float(e.value) - robot.before[name]) > SURE * float(e.standard_error)
+        for name, e in robot.estimates(state).items()
+    )
+
+
+def _changed(robot: Bodies, state: State, apart: Collection[str]) -> float:
+    """By how much a state's numbers differ from the simulator's, a part of each, summed; where a
+    mass takes more than one number of the file, that counts as another one.
+    """
+    found = 0.0
+    for name, value in state.items():
+        if name in robot.place:
+            found += 1.0
+            continue
+        body, what = robot.owner[name]
+        before, size = robot.before[name], abs(value - robot.before[name])
+        whole = size + robot.size(name) if what.startswith("centre") else abs(value) + abs(before)
+        found += size / whole
+        found += {MASS: body in apart, MASS_ALONE: body not in apart}.get(what, 0)
+    return found
+
+
+def _instead(robot: Bodies, state: State) -> dict[str, tuple[str, ...]]:
+    """To each number of a state, others that would do as well in its place.
+
+    With these all joints together leave no more than noise like theirs takes for the number that is
+    replaced, or each of them no more than a sensor of force resolves.
+    """
+    found = {}
+    for name in state:
+        rest = {n: v for n, v in state.items() if n != name}
+        names = [n for n in _others(robot, rest) if n != name]
+        energy, noise = robot.energies(state), _noise(robot, name, rest, state)
+        more = {n: _left(robot, [*rest, n], rest) - energy for n in names}
+        alike = (
+            n for n, each in more.items()
+            if each.sum() <= SURE**2 * noise or np.all(each <= robot.enough)
+        )  # fmt: skip
+        if others := tuple(alike):
+            found[name] = others
+    return found
+
+
+def _left(robot: Bodies, names: Sequence[str], start: State) -> np.ndarray:
+    """What the best values of some numbers leave of each joint, infinite for none that can be,
+    `(joints,)`.
+    """
+    energy, state = robot.fitted(names, start)
+    return robot.energies(state) if np.isfinite(energy) else np.full(len(robot.joints), np.inf)
+
+
+def _noise(robot: Bodies, name: str, rest: State, state: State) -> float:
+    """The energy that a number beside others takes of noise like what a state leaves."""
+    rows = robot.rows([*rest, name], state)
+    beside = orthonormal(rows.columns[:, :-1])
+    lone = rows.columns[:, -1] - beside @ (beside.T @ rows.columns[:, -1])
+    size = max(float(np.linalg.norm(lone)), 1e-300)
+    return float(np.sum(np.bincount(robot.block, lone / size * rows.residual) ** 2))

@@ -1,0 +1,108 @@
+"""One joint's log as rows of a regression that several joints share: by what its bodies weigh."""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..data.recording import Recording
+from ..models import Model
+from ..simulators import Mujoco
+from ..simulators.weights import linear
+from ..terms import KnownColumns, KnownForce, Offset, channels_of
+from ..terms.base import summands
+from ..terms.effects import traits
+from .evidence import Evidence, gather
+from .figures import cast
+from .least_squares import orthonormal, solve
+from .motion import motion_of
+from .nodes import NODES
+from .predictions import with_predictions
+from .regression import Fit, fit
+from .significance import blocks
+
+
+class JointRows(NamedTuple):
+    """One joint's rows, divided by its noise, without the span of the physics that was found in it.
+
+    - `name` of the joint; `own`: names of its own values, p of them, in the simulator's words.
+    - `columns` `(J, p + 10 B)`: the force by a unit of its own values, and of the ten parameters
+      that the force of each of the model's B bodies is linear in; `target` `(J,)`: what the
+      simulator, as given, leaves; `block` of each row, `(J,)`.
+    - `enough`: the energy below which no sensor of force tells anything, in units of the noise's.
+    """
+
+    name: str
+    own: tuple[str, ...]
+    columns: np.ndarray
+    target: np.ndarray
+    block: np.ndarray
+    enough: float
+
+
+def joint_rows(
+    simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float, wide: int = 1
+) -> JointRows:
+    """The rows of a joint.
+
+    **Arguments:** `simulator` as given, `log` `(N,)`; `found`, the model of the joint's own
+    explanation, whose missing physics stands beside; `delay`, s, by which the force is taken later;
+    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width.
+    """
+    seen = simulator.along(log)
+    parts = linear(simulator.mujoco, simulator.model, simulator.number, seen)
+    names = [name for name in simulator.attributes() if not name.startswith("body/")]
+    first = len(simulator.attributes())
+    beside = simulator.beside(log)
+    channels = dict(beside.channels)
+    for number, pair in enumerate(parts):
+        channels |= dict(zip(channels_of(first + number), map(jnp.asarray, pair), strict=True))
+    motion = motion_of(cast(dataclasses.replace(beside, channels=channels)))
+    evidence = gather(motion, delay=delay)
+    if wide > 1:
+        evidence = gather(motion, wide * evidence.width, delay, half=wide * NODES)
+    every = KnownColumns(tuple(simulator.attributes()), ("1",) * first)
+    ten = KnownColumns(tuple(f"{i}" for i in range(len(parts))), ("1",) * len(parts), first)
+    known = evidence.columns(every, np.zeros((1, 0)))[0]
+    own = [known[:, [i]] for i, name in enumerate(every.names) if name in names]
+    constant = [t for t in summands(simulator.baseline(log.units).term) if isinstance(t, Offset)]
+    own += [evidence.columns(t, np.zeros((1, 0)))[0] for t in constant]
+    names += [p.name for t in constant for p in t.affine]
+    columns = np.concatenate([*own, evidence.columns(ten, np.zeros((1, 0)))[0]], axis=1)
+    basis = _physics(found, evidence)
+    columns = columns - basis @ (basis.T @ columns)
+    target = evidence.target - basis @ (basis.T @ evidence.target)
+    left = target - columns @ solve(columns, target)
+    noise = max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    enough = (linearity / noise) ** 2 * float(evidence.force @ evidence.force)
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    return JointRows(simulator.joint, tuple(names), columns / noise, target / noise, block, enough)
+
+
+def _physics(found: Model, evidence: Evidence) -> np.ndarray:
+    """An orthonormal basis of the force of the missing physics that a joint's model holds."""
+    terms, betas, alphas, start = [], [], [], 0
+    for term in summands(found.term):
+        alpha = np.asarray(found.alpha[start : start + len(term.affine)], float)
+        start += len(term.affine)
+        terms.append(term)
+        betas.append(np.asarray(term.beta(), float).reshape(len(term.nonlinear)))
+        alphas.append(alpha)
+    empty = np.zeros((len(evidence.target), 0))
+    whole = Fit(tuple(terms), tuple(betas), tuple(alphas), empty, empty, evidence.target, 0.0)
+    missing = [i for i, term in enumerate(terms) if _is_physics(term)]
+    if not missing:
+        return empty
+    seen = with_predictions(evidence, _without_known(whole))
+    there = fit(whole.only(missing).terms, seen, whole.only(missing).betas, 0)
+    return orthonormal(there.jacobian)
+
+
+def _is_physics(term) -> bool:
+    return not isinstance(term, KnownForce | KnownColumns | Offset) and not traits(term).late
+
+
+def _without_known(whole: Fit) -> Fit:
+    """The fit without what a simulator says its parameters add, which predicts little."""
+    return whole.only([i for i, t in enumerate(whole.terms) if not isinstance(t, KnownColumns)])

@@ -1,0 +1,203 @@
+"""What a robot's bodies weigh, by all its joints together: one value each, the fewest that do."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import jaxfric as jf
+from jaxfric import cli
+from jaxfric.explanation.bodies import Bodies
+from jaxfric.explanation.fewest_numbers import answer
+from jaxfric.explanation.joint_rows import JointRows
+from jaxfric.export.patch import patch
+from jaxfric.simulators import inverse
+from jaxfric.simulators.patching import patched
+from jaxfric.simulators.weights import linear, possible, weights
+
+mujoco = pytest.importorskip("mujoco")
+
+ARM = """<mujoco>
+  <compiler angle="radian"/>
+  <option timestep="0.001" integrator="implicitfast"/>
+  <worldbody>
+    <body name="upper">
+      <joint name="shoulder" axis="0 1 0" damping="0.8" armature="0.05"/>
+      <inertial pos="0.15 0 0" mass="2.0" diaginertia="0.004 0.02 0.02"/>
+      <body name="fore" pos="0.3 0 0">
+        <joint name="elbow" axis="0 1 0" damping="0.5" armature="0.02"/>
+        <inertial pos="{centre}" mass="{mass}" diaginertia="0.002 0.009 0.009"/>{load}
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+RIGHT = {"centre": "0.1 0 0", "mass": "1.2", "load": ""}
+# A load of 0.5 kg at 0.24 m: the sum weighs 1.7 kg and has its centre at 0.2400 / 1.7 m.
+LOAD = """<body pos="0.24 0 0">
+  <inertial pos="0 0 0" mass="0.5" diaginertia="4e-4 4e-4 4e-4"/></body>"""
+FORE = "body/fore/"
+
+
+def arm(**other):
+    return ARM.format(**RIGHT | other)
+
+
+def motion(count=1500, seconds=12.0):
+    """A motion of both joints with its exact derivatives, and the time, s."""
+    time = np.linspace(0, seconds, count)
+    rates, sizes = (
+        2 * np.pi * np.array([[0.3, 0.7], [0.5, 1.1]]),
+        np.array([[0.6, 0.2], [0.7, 0.2]]),
+    )
+    angle = rates[:, :, None] * time + np.array([[0.3, 2.0], [1.0, 0.1]])[:, :, None]
+    size, rate = sizes[:, :, None], rates[:, :, None]
+    parts = size * np.sin(angle), size * rate * np.cos(angle), -size * rate**2 * np.sin(angle)
+    return inverse.Motion(*(part.sum(axis=1).T for part in parts)), time
+
+
+def rows(nominal, plant, noise=0.005, seed=0):
+    """The rows of both joints, the force that of the plant by MuJoCo, and what the bodies weigh."""
+    model, true = (mujoco.MjModel.from_xml_string(text) for text in (nominal, plant))
+    along, time = motion()
+    seen = inverse.along(mujoco, model, along)
+    forces = inverse.forces(mujoco, true, along) - inverse.forces(mujoco, model, along)
+    draw, found = np.random.default_rng(seed), []
+    for joint, name in enumerate(("shoulder", "elbow")):
+        parts = linear(mujoco, model, joint, seen)
+        columns = np.array([rest + np.gradient(moving, time) for rest, moving in parts]).T
+        own = np.array([along.velocity[:, joint], along.acceleration[:, joint]]).T
+        inner = slice(2, -2)  # the ends have one-sided differences
+        target = forces[:, joint] + noise * draw.normal(size=len(time))
+        names = (f"joint/{name}/damping", f"joint/{name}/armature")
+        whole = np.concatenate([own, columns], axis=1)[inner] / noise
+        block = np.arange(len(time) - 4) * 24 // (len(time) - 4)
+        found.append(JointRows(name, names, whole, target[inner] / noise, block, 1.0))
+    return Bodies(found, weights(mujoco, model))
+
+
+@pytest.mark.parametrize(
+    "other,values",
+    [
+        ({"mass": "1.7"}, {"mass_alone": 1.7}),
+        ({"centre": "0.17 0 0"}, {"centre_x": 0.17}),
+        ({"centre": "0.14 0 0", "mass": "1.7"}, {"mass_alone": 1.7, "centre_x": 0.14}),
+    ],
+)
+def test_the_fewest_numbers_are_those_that_differ(other, values):
+    robot = rows(arm(), arm(**other))
+    found = answer(robot, {"upper", "fore"})
+    assert set(found.values) == {FORE + name for name in values}
+    for name, value in values.items():
+        estimate = found.estimates[FORE + name]
+        assert abs(found.values[FORE + name] - value) < max(3 * estimate.standard_error, 1e-4)
+        assert estimate.standard_error < 0.01 * value
+
+
+def test_a_load_is_one_body_of_one_mass_and_centre():
+    found = answer(rows(arm(), arm(load=LOAD)), {"upper", "fore"})
+    assert {name.split("/")[1] for name in found.values} == {"fore"}
+    assert abs(found.values[FORE + "mass_alone"] - 1.7) < 0.02
+    assert abs(found.values[FORE + "centre_x"] - 0.24 / 1.7) < 0.002
+
+
+def test_what_one_joint_cannot_tell_apart_is_said():
+    """One hinge sees m c and the inertia about itself: mass, centre, inertia and armature make
+    these two, so that either of two numbers may be another.
+    """
+    robot = rows(arm(), arm(load=LOAD))
+    alone = Bodies([robot.joints[1]], robot.weights)
+    found = answer(alone, {"upper", "fore"})
+    assert len(found.values) == 2
+    others = {name for each in found.instead.values() for name in each}
+    assert others & {"elbow:joint/elbow/armature", FORE + "inertia_y"}
+
+
+def test_nothing_is_found_where_nothing_differs():
+    assert answer(rows(arm(), arm()), ()).values == {}
+
+
+def test_an_inertia_is_one_that_a_body_can_have():
+    assert np.allclose(possible(np.array([1.0, 4.0, 2.0]), [1]), [1.5, 4.0, 2.5], rtol=1e-4)
+    assert np.array_equal(possible(np.array([1.0, 2.0, 2.5]), [1]), [1.0, 2.0, 2.5])
+    with pytest.raises(ValueError, match="no body"):
+        possible(np.array([1.0, 4.0, 2.0]), [0, 1, 2])
+    done = patched(mujoco, arm(), {FORE + "inertia_y": 0.02})
+    assert done.written == (FORE + "inertia_y",) and not done.left
+    inertia = mujoco.MjModel.from_xml_string(done.text).body_inertia[2]
+    assert inertia[1] == pytest.approx(0.02) and inertia[0] + inertia[2] >= inertia[1]
+
+
+def test_a_mass_alone_is_one_number_of_the_file():
+    done = patched(mujoco, arm(), {FORE + "mass_alone": 1.7})
+    changed = set(done.text.splitlines()) - set(arm().splitlines())
+    assert len(changed) == 1 and 'mass="1.7" diaginertia="0.002 0.009 0.009"' in changed.pop()
+
+
+def log(path, plant, seed):
+    """A log of both joints under a controller, with noise."""
+    model = mujoco.MjModel.from_xml_string(plant)
+    data, draw = mujoco.MjData(model), np.random.default_rng(seed)
+    along, time = motion(12000)
+    turn = draw.uniform(0.8, 1.0)
+    data.qpos[:], data.qvel[:] = turn * along.position[0], turn * along.velocity[0]
+    table, gains = [], np.array([900.0, 300.0])
+    for i in range(len(time)):
+        away = turn * along.position[i] - data.qpos
+        force = gains * away + 0.06 * gains * (turn * along.velocity[i] - data.qvel)
+        if i % 3 == 0:
+            table.append([i * model.opt.timestep, *data.qpos, *force])
+        data.qfrc_applied[:] = force
+        mujoco.mj_step(model, data)
+    table = np.array(table)
+    table[:, 1:3] += 1e-5 * draw.normal(size=(len(table), 2))
+    table[:, 3:] += 0.003 * table[:, 3:].std(axis=0) * draw.normal(size=(len(table), 2))
+    header = "time,shoulder_position,elbow_position,shoulder_torque,elbow_torque"
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+
+
+@pytest.mark.slow
+def test_a_load_is_written_once_and_the_file_keeps_its_word(tmp_path, capsys):
+    (tmp_path / "arm.xml").write_text(arm())
+    logs = [str(tmp_path / f"log{seed}.csv") for seed in (1, 2)]
+    for seed, path in enumerate(logs):
+        log(path, arm(load=LOAD), seed)
+    command = ["explain", logs[0], "--holdout", logs[1], "--mujoco", str(tmp_path / "arm.xml")]
+    out = {name: str(tmp_path / name) for name in ("new.xml", "out.json")}
+    assert cli.main([*command, "--save", out["new.xml"], "--json", out["out.json"]]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("shoulder and elbow together: body fore") == 1 and "not all of" not in said
+    document = json.loads((tmp_path / "out.json").read_text())
+    model = mujoco.MjModel.from_xml_path(out["new.xml"])
+    assert model.body_mass[2] == pytest.approx(1.7, rel=0.02)
+    assert model.body_ipos[2][0] == pytest.approx(0.24 / 1.7, rel=0.02)
+    for errors in document["patch"]["errors"].values():
+        assert errors["holdout_force_error"]["file"] < 0.02 < errors["force_error"]["before"]
+    assert document["patch"]["misses"] == [] and document["patch"]["left"] == []
+
+
+@pytest.mark.slow
+def test_a_value_that_makes_a_joint_worse_is_not_written(tmp_path):
+    path, file = tmp_path / "log.csv", tmp_path / "arm.xml"
+    file.write_text(arm())
+    log(path, arm(mass="1.7"), 1)
+    columns = {"position": "elbow_position", "force": "elbow_torque"}
+    units = {"force": "N·m", "position": "rad"}
+    others = {"shoulder": "shoulder_position"}
+    recording = jf.read(str(path), columns=columns | others, units=units)
+    told = jf.explain(recording, jf.simulators.mujoco(str(file), joint="elbow"))
+    done = patch(str(file), {"elbow": told}, {"elbow": [recording]}, "new.xml")
+    assert any(line.startswith("body/fore/") for line in done.written)
+    finding = next(f for f in told.findings if f.effect == "parameter_mismatch")
+    worse = {
+        name: m._replace(estimate=m.estimate._replace(value=4 * m.value))
+        for name, m in finding.parameters.items()
+        if name.startswith("body/")
+    }
+    told = dataclasses.replace(told, findings=[finding._replace(parameters=worse)])
+    done = patch(str(file), {"elbow": told}, {"elbow": [recording]}, "new.xml")
+    assert not done.written and "joint elbow would be worse" in done.left[0]
+    assert "not all of its answer is in the file" in done.misses[0]
+    error = done.errors["elbow"]["force_error"]
+    assert error["file"] == pytest.approx(error["before"])
