@@ -323,7 +323,7 @@ def test_a_row_of_numpy_has_its_diagnosis():
     nothing = dict.fromkeys(
         ("model", "covariance", "windows", "covered", "filtered_force_error", "cost")
     )
-    found = Identified(result=alone, projection="weak_form", open_ends=None, **nothing)
+    found = Identified(result=alone, weak=np.True_, open_ends=None, **nothing)
     assert found.diagnosis.startswith("The axis never slips")
 
 

@@ -339,7 +339,7 @@ def test_the_pytrees_stay_what_they_were(fit, recording):
         assert jax.tree.structure(again) == structure and str(again) == str(tree)
     assert {f.name for f in dataclasses.fields(fit)} == {
         "model", "covariance", "result", "windows", "covered", "filtered_force_error", "cost",
-        "open_ends", "projection", "rival", "warnings", "border",
+        "open_ends", "weak", "rival", "warnings", "border",
     }  # fmt: skip
 
 

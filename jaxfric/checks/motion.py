@@ -169,12 +169,17 @@ def _slow_gain(moved: np.ndarray, driven: np.ndarray, changed: np.ndarray, span:
     if not np.all(size > 0):
         return 1.0
     columns = columns / size
-    inverse = np.linalg.pinv(columns.T @ columns)
+    gram = columns.T @ columns
+    if np.linalg.cond(gram) * np.finfo(float).eps > 1:
+        return 1.0
+    inverse = np.linalg.inv(gram)
     found = inverse @ (columns.T @ moved)
     ends = np.arange(BLOCKS) * len(moved) // BLOCKS
     scores = np.add.reduceat(columns * (moved - columns @ found)[:, None], ends)
     gain, error = found[0] / size[0], np.linalg.norm(scores @ inverse[0]) / size[0]
-    return float(gain) if abs(gain - 1) > max(SCALE, SURE * error) else 1.0
+    # Of one frequency a scale is a filter: what noise takes off counts by what no filter makes.
+    least = SCALE * float(np.sqrt(inverse[0, 0]))
+    return float(gain) if abs(gain - 1) > max(least, SURE * error) else 1.0
 
 
 def _exchanged(recording: Recording, moved: np.ndarray, driven: np.ndarray) -> float | None:
