@@ -227,13 +227,12 @@ def test_what_makes_the_held_out_recording_worse_is_not_written():
     """Of a wrong and a right change the right one; none where each is worse than nothing."""
     effects = {"right": -0.5, "wrong": 0.2, "worse": 0.9}
 
-    def errors(some):
-        return [np.exp(sum(effects[name] for name in some)), 0.01]
+    def error(some):
+        return np.exp(sum(effects[name] for name in some))
 
-    assert kept(["right", "worse"], errors) == ["right"]
-    assert kept(["right", "wrong"], errors) == ["right", "wrong"]  # together no worse than before
-    assert kept(["worse", "wrong"], errors) == []
-    assert kept(["worse"], lambda some: []) == ["worse"]  # nothing is held out
+    assert kept(["right", "worse"], error) == ["right"]
+    assert kept(["right", "wrong"], error) == ["right", "wrong"]  # together no worse than before
+    assert kept(["worse", "wrong"], error) == []
 
 
 # ---- forms in which robots are logged ----

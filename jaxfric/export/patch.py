@@ -145,14 +145,13 @@ def _confirmed(
     """The forces of a joint beside the file that make its held-out recording no worse."""
     if model is None or len(recordings) < 2 or not able:
         return list(able)
-
     pair = _pair(source, text, joint, recordings, {})
 
-    def errors(some: Sequence[Part]) -> list[float]:
+    def error(some: Sequence[Part]) -> float:
         forces = callback.only(model, some) if some else None
-        return [reached(_errors(told, *pair, recordings, forces)[HELD])]
+        return reached(_errors(told, *pair, recordings, forces)[HELD])
 
-    return kept(able, errors)
+    return kept(able, error)
 
 
 def _without_harm(
