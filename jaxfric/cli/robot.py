@@ -14,7 +14,7 @@ from ..identification import documents, tabulate
 from ..report import page, robot
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..terms.effects.parameter_mismatch import MISMATCH
-from . import joint_columns
+from . import joint_columns, robot_text
 from .commands import put, today, working
 from .messages import say
 from .robot_joints import Joint, checked_logs, explained, opened
@@ -189,11 +189,11 @@ def _print(arguments: Namespace, found: list[Joint], done: Patch | None) -> None
         say(tabulate.explanation(_document(arguments, found[0])))
     else:
         say(
-            tabulate.joints(
+            robot_text.joints(
                 arguments.mujoco, arguments.file, [_row(joint, done) for joint in found]
             )
         )
     if done is not None:
-        say(f"\n{tabulate.patch(arguments.save, done.to_dict())}")
+        say(f"\n{robot_text.patch(arguments.save, done.to_dict())}")
     elif arguments.save and found[0].told is not None:
         saved(arguments.save, found[0].told.model)

@@ -40,27 +40,27 @@ def solve(term, beta, recording, rows: Rows, alpha=None):
     return alpha, jacobian, target - jacobian[:, : alpha.size] @ alpha
 
 
-class Heavy(NamedTuple):
-    """Mass times acceleration at the samples, `force`, N; the acceleration, `slope`, and by how
-    much that is unsure at the ends of a stretch, `rough`, m/s²; all `(N,)`.
+class InertialForce(NamedTuple):
+    """Mass times acceleration at the samples, `force`, N; the `acceleration`, and by how much that
+    is `unsure` at the ends of a stretch in slip, m/s²; all `(N,)`.
 
     By Lemma 1 its integral over a closed window with any function of velocity is zero. The sum over
     samples is not, where few of them lie in a bump: a mass that is taken for friction. So beside a
-    bump it is taken off, by a mass that need not be exact.
+    bump it is taken off, by a mass that need not be exact (Kim, Kim & Ha 2004, for the integral).
     """
 
     force: Float[Array, " N"]
-    slope: Float[Array, " N"]
-    rough: Float[Array, " N"]
+    acceleration: Float[Array, " N"]
+    unsure: Float[Array, " N"]
 
 
-def heavy(recording, limits: Scales, rows: Rows) -> Heavy:
+def inertial_force(recording, limits: Scales, rows: Rows) -> InertialForce:
     """What is taken off the force of a prepared recording in the `rows` of closed windows."""
     force, velocity = recording.force, recording.velocity
     slope, rough = _slope_in_slip(recording, limits)
     wide = signals.mean_slope(recording, velocity, NEAR, limits.interval)
-    mass = weighing.first_weighed(force, velocity, slope, wide, rows)
-    return Heavy(mass * slope, slope, rough)
+    mass = weighing.first_mass(force, velocity, slope, wide, rows)
+    return InertialForce(mass * slope, slope, rough)
 
 
 def _slope_in_slip(recording, limits: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
@@ -103,7 +103,7 @@ def solved(
     limits: Scales,
     rows: Rows,
     weak: Rows,
-    heavy: Heavy | None = None,
+    inertial: InertialForce | None = None,
 ) -> Solved:
     """A fit of the term `known` with its uncertainty, and the mass where `term` has one beyond."""
     weight = rows.positive + rows.negative
@@ -122,12 +122,12 @@ def solved(
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
     # The mass times acceleration is no noise of the friction: Lemma 1 has removed its effect.
-    if heavy is None:
+    if inertial is None:
         slope = signals.mean_slope(recording, recording.velocity, NEAR, limits.interval)
         noise = error - weighed.mass * slope
     else:
-        slope = heavy.slope
-        noise = error + heavy.force - weighed.mass * slope
+        slope = inertial.acceleration
+        noise = error + inertial.force - weighed.mass * slope
     spread = uncertainty.deviations(jacobian, noise, weight, place)
     pull = weighing.open_ends(jacobian[:, : alpha.size], slope, rows.moving) * weighed.mass
     push, friction = weighed.columns[:, :1], weighed.columns[:, 1:]
@@ -135,8 +135,8 @@ def solved(
     heavier = _moved(push, rise, weak.positive + weak.negative)
     shift = jnp.insert(shift, index[0], heavier[0])
     spread = weighed.beside(spread, index[0])
-    if heavy is not None:
-        off = _moved(jacobian, weighed.mass * heavy.rough, weight)
+    if inertial is not None:
+        off = _moved(jacobian, weighed.mass * inertial.unsure, weight)
         spread = spread.beyond(jnp.insert(off, index[0], off @ weighed.through))
     return Solved(
         jnp.insert(alpha, index[0], weighed.mass),
@@ -194,8 +194,8 @@ def passive(term, alpha, matrix, design: Design, weak: Rows, recording) -> Bool[
     bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
     variance = jnp.diagonal(matrix)
     inertia = np.array([p.name == "inertia" for p in term.affine], bool)
-    heavy = alpha + bound * jnp.sqrt(variance[: alpha.size]) >= 0
-    passive = jnp.all(heavy | ~inertia)
+    inertial = alpha + bound * jnp.sqrt(variance[: alpha.size]) >= 0
+    passive = jnp.all(inertial | ~inertia)
     friction = _by_velocity(term)
     if not friction.any():
         return passive

@@ -86,11 +86,8 @@ def checked(
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
-        # Of a load beyond the dry friction one direction has the friction less the load.
-        loaded = constant_load.load(names, alpha, half) is not None
-        counted = [k for k in passive if not (loaded and names[k].startswith("coulomb"))]
-        if negative := int(np.sum((alpha + half)[counted] < 0)):
-            warnings[i, checks.NAMES.index("negative_parameter")] = negative
+        if negative := _negative(names, alpha, half, passive):
+            warnings[i, NEGATIVE] = negative
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
             # What accelerates the axis there is noise.
             k = names.index("inertia")
@@ -117,6 +114,16 @@ def checked(
     )
 
 
+def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passive) -> int:
+    """How many of the `passive` parameters, by number, are negative for sure.
+
+    Of a load beyond the dry friction one direction has the friction less the load.
+    """
+    loaded = constant_load.load(names, alpha, half) is not None
+    counted = [k for k in passive if not (loaded and names[k].startswith("coulomb"))]
+    return int(np.sum((alpha + half)[counted] < 0))
+
+
 def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
     """The standard error, s, of the moment at which the force acts.
 
@@ -138,8 +145,8 @@ def _by_velocity(found: Identified, row: int) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0) * np.array(powers)
 
 
-STRUCTURE, ONE_SPEED, GAIN = (
-    checks.NAMES.index(name) for name in ("structure_left", "one_speed", "velocity_gain")
+STRUCTURE, ONE_SPEED, GAIN, NEGATIVE = map(
+    checks.NAMES.index, ("structure_left", "one_speed", "velocity_gain", "negative_parameter")
 )
 
 

@@ -8,7 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from .. import checks, programs, signals
 from ..checks import Design
@@ -24,7 +24,7 @@ from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .narrowing import narrowed, reaching
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
-from .setup import Setup, ready_rows, set_up, together
+from .setup import Setup, all_finite, ready_rows, sanitised, set_up, together
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
@@ -51,7 +51,7 @@ def identify(
     - `model`: a sum of terms, a model's name, or an earlier result (its structure is used).
     - `recording`: one recording, or a batch made by `stack`: then every leaf of the result has a
       leading axis, and what goes wrong in a row stays in that row.
-    - `projection`: `ClosedWindows()` (no mass, no acceleration; the paper) or
+    - `projection`: `ClosedWindows()` (mass and acceleration cancel; the paper) or
       `WeakForm(half_width)`; by default the terms decide, and closed windows that would
       use less than half of the slip time give way to the weak form.
     - `bounds`: lower and upper bound of nonlinear parameters by name; else from the recording.
@@ -211,33 +211,33 @@ solve_rows = programs.compiled(_solve_rows)
 class _Searched(NamedTuple):
     """What the nonlinear parameters were searched in, and what was found; the velocity's noise.
 
-    `heavy`: what was taken off the force in closed windows.
+    `inertial`: what was taken off the force in closed windows.
     """
 
     limits: Scales
     noise: Float[Array, ""]
     rows: Rows
     found: Found
-    heavy: "assessment.Heavy | None"
+    inertial: "assessment.InertialForce | None"
 
 
 @programs.compiled
 def _search_rows(magnitudes, term, recording, projection, width, given, grid) -> _Searched:
     """The nonlinear parameters."""
-    recording = _sanitised(recording)
+    recording = sanitised(recording)
     limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
     rows = projection.rows(recording, limits)
-    active, heavy = term if projection.keeps_inertia else _without_inertia(term), None
+    active, inertial = term if projection.keeps_inertia else _without_inertia(term), None
     if active.nonlinear and not projection.keeps_inertia:
-        heavy = assessment.heavy(recording, limits, rows)
-        rows = eqx.tree_at(lambda r: r.target, rows, rows.target - heavy.force)
+        inertial = assessment.inertial_force(recording, limits, rows)
+        rows = eqx.tree_at(lambda r: r.target, rows, rows.target - inertial.force)
     box = term_bounds(
         active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
     )
     # By default both directions have the bounds that the whole recording suggests.
     alike = not any(name.endswith(("+", "-")) for name, _ in given)
     found = search(active, recording, rows, box, grid, alike)
-    return _Searched(limits, noise, rows, found, heavy)
+    return _Searched(limits, noise, rows, found, inertial)
 
 
 @programs.compiled
@@ -245,17 +245,26 @@ def _assess(
     searched: _Searched, term, recording, projection, width, given, grid
 ) -> tuple[Identified, Design]:
     """All parameters and what is known about them, from the nonlinear ones."""
-    limits, noise, rows, best, heavy = searched
+    limits, noise, rows, best, inertial = searched
     beta, converged, border, alpha = best[:4]
-    finite = _finite(recording)
-    recording = _sanitised(recording)
+    finite = all_finite(recording)
+    recording = sanitised(recording)
     weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
     active = term if projection.keeps_inertia else _without_inertia(term)
     alpha, jacobian, error = assessment.solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
-    minimum = jnp.sum(weight * (error if heavy is None else error + heavy.force) ** 2)
+    minimum = jnp.sum(weight * (error if inertial is None else error + inertial.force) ** 2)
     alpha, spread, design, pull = assessment.solved(
-        active.with_beta(beta), alpha, jacobian, error, term, recording, limits, rows, weak, heavy
+        active.with_beta(beta),
+        alpha,
+        jacobian,
+        error,
+        term,
+        recording,
+        limits,
+        rows,
+        weak,
+        inertial,
     )
     matrix = spread.covariance
     nothing = ~finite | (jnp.sum(weight) <= 0)
@@ -311,7 +320,7 @@ def _identify(*setup) -> tuple[Identified, Design]:
     recording = setup[1]
     magnitudes = None
     if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(setup)):
-        magnitudes = signals.host_scales(_sanitised(jax.tree.map(np.asarray, recording), np))
+        magnitudes = signals.host_scales(sanitised(jax.tree.map(np.asarray, recording), np))
     return _assess(_search_rows(magnitudes, *setup), *setup)
 
 
@@ -329,28 +338,6 @@ def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, "
     top = jnp.max(jnp.where(used, jnp.abs(velocity)[None, :], 0.0), axis=1)
     both = jnp.min(jnp.where(top > limits.slowest, top, jnp.inf))
     return jnp.maximum(jnp.minimum(limits.fastest, both), 4 * limits.slowest)
-
-
-def _finite(recording: Recording) -> Bool[Array, ""]:
-    signals_ = [recording.time, recording.force, recording.velocity, recording.position]
-    good = [jnp.all(jnp.isfinite(s) | ~recording.mask) for s in signals_ if s is not None]
-    return jnp.all(jnp.stack(good))
-
-
-def _sanitised(recording: Recording, of=jnp) -> Recording:
-    """Zeros for what is not finite, so that one bad sample cannot spoil sums or gradients.
-
-    `of`: the arrays' module, `numpy` on the host.
-    """
-
-    def clean(x):
-        inexact = jnp.issubdtype(x.dtype, jnp.inexact)
-        return of.where(of.isfinite(x), x, x.dtype.type(0)) if inexact else x
-
-    usable = recording.mask
-    for signal in (recording.force, recording.velocity, recording.time):
-        usable = usable & of.isfinite(signal)
-    return eqx.tree_at(lambda r: r.mask, jax.tree.map(clean, recording), usable)
 
 
 def _without_inertia(term: AbstractTerm) -> AbstractTerm:

@@ -20,7 +20,7 @@ from ..data.recording import Recording
 from ..signals.polynomial import HALF_WIDTHS
 from .identified import Identified, Result
 from .setup import Setup
-from .uncertainty import COSINES, student_quantile
+from .uncertainty import COSINES, reach, student_quantile
 
 Solve = Callable[..., tuple[Identified, Design]]
 
@@ -66,7 +66,7 @@ def narrowed(
 
 def reaching(found: Identified, apart: np.ndarray) -> Identified:
     """The same with intervals that reach as far as the parameters move, `(..., P)`."""
-    step = apart / student_quantile(0.975, COSINES)
+    step = reach(apart)
     more = step[..., :, None] * step[..., None, :]
     wider = found.covariance + jnp.asarray(more, found.covariance.dtype)
     return eqx.tree_at(lambda f: f.covariance, found, wider)

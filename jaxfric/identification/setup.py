@@ -4,8 +4,11 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Bool
 
 from .. import signals
 from ..data.recording import Recording, described, row_of
@@ -170,3 +173,26 @@ def together(recording: Recording, rows: Sequence[signals.Ready]) -> Recording:
     each = [(one.recording.velocity, one.recording.mask) for one in rows]
     velocity, mask = (np.stack(list(map(np.asarray, own))) for own in zip(*each, strict=True))
     return dataclasses.replace(recording, velocity=velocity, mask=mask)
+
+
+def all_finite(recording: Recording) -> Bool[Array, ""]:
+    """Whether every signal of a recording is a number at all valid samples."""
+    signals_ = [recording.time, recording.force, recording.velocity, recording.position]
+    good = [jnp.all(jnp.isfinite(s) | ~recording.mask) for s in signals_ if s is not None]
+    return jnp.all(jnp.stack(good))
+
+
+def sanitised(recording: Recording, of=jnp) -> Recording:
+    """Zeros for what is not finite, so that one bad sample cannot spoil sums or gradients.
+
+    `of`: the arrays' module, `numpy` on the host.
+    """
+
+    def clean(x):
+        inexact = jnp.issubdtype(x.dtype, jnp.inexact)
+        return of.where(of.isfinite(x), x, x.dtype.type(0)) if inexact else x
+
+    usable = recording.mask
+    for signal in (recording.force, recording.velocity, recording.time):
+        usable = usable & of.isfinite(signal)
+    return eqx.tree_at(lambda r: r.mask, jax.tree.map(clean, recording), usable)

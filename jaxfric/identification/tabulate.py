@@ -170,7 +170,7 @@ def _how(document: Mapping[str, Any], automatic: bool) -> str:
     if document["projection"] == "closed_windows":
         count = document["windows"]
         which = f"{count} window{'s' * (count != 1)}"
-        return f"closed windows ({which}, {covered}; no mass, no acceleration)"
+        return f"closed windows ({which}, {covered}; mass and acceleration cancel)"
     why = "closed windows would use less than half of it; " * automatic
     return f"weak form ({document['windows']} slip stretches, {covered}; {why}inertia fitted too)"
 
@@ -300,77 +300,3 @@ def _places(document: Mapping[str, Any]) -> list[Block]:
         hidden.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
     tables = [Table(where, (1, 2)), Table(hidden, (1,))]
     return [table for table in tables if len(table.rows) > 1]
-
-
-def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
-    """What a simulator's joints and a log differ in, a row each."""
-    table = [["joint", "verdict", "error", "after", "held out", "after", "what"]]
-    for row in rows:
-        if "error" in row:
-            table.append([row["joint"], row["verdict"], *[""] * 4, "see below"])
-            continue
-        errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
-        cells = [f"{e[w]:.2%}" if e else "" for e in errors for w in ("before", "after")]
-        table.append([row["joint"], row["verdict"], *cells, "see below" * bool(row["findings"])])
-    lines = [f"{printable(simulator)} against {printable(log)}", ""]
-    lines += aligned(table, (2, 3, 4, 5))
-    every = [each for row in rows for each in row.get("findings", ())]
-    shared = {each for each in every if every.count(each) > 1}  # said of several joints together
-    lines += [
-        line for each in dict.fromkeys(every) if each in shared for line in ["", *wrapped(each)]
-    ]
-    for row in rows:
-        said = [row["error"]] if "error" in row else row["findings"]
-        for each in said:
-            lines += [] if each in shared else ["", *wrapped(f"{row['joint']}: {each}")]
-        if row.get("corrected_before"):
-            lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
-        for each in row.get("actuator", ()):
-            lines += ["", *wrapped(f"{row['joint']}: {each}")]
-    for each in dict.fromkeys(note for row in rows for note in row.get("still", ())):
-        lines += ["", *wrapped(each)]
-    after = " After: of the file as it was written." * any("file" in row for row in rows)
-    lines += ["", f"Force errors through the kernel by which effects are looked for.{after}"]
-    return "\n".join(lines)
-
-
-def _with_file(row: Mapping[str, Any], name: str) -> Mapping[str, float] | None:
-    """A joint's errors before and after; after by the written file, where there is one."""
-    error = row[f"filtered_{name}"]
-    written = row.get("file", {}).get(name)
-    return error if written is None or error is None else {**error, "after": written}
-
-
-def patch(path: str, document: Mapping[str, Any]) -> str:
-    """What was written into a simulator's file, and what that is worth."""
-    lines = [f"{path}:"]
-    lines += [f"  {line}" for line in document["written"] or ["nothing to change"]]
-    for line in document["left"]:
-        lines += wrapped(f"  not written: {line}")
-    table = [["force error", "before", "with the file", "with the callback too"]]
-    for joint, errors in document["errors"].items():
-        for name, error in errors.items():
-            held = "held out" if name.startswith("holdout") else "recording"
-            cells = [f"{error[w]:.2%}" if w in error else "" for w in ("before", "file", "forces")]
-            table.append([f"{joint}, {held}", *cells])
-    lines += ["", *aligned(table, (1, 2, 3))]
-    for line in document["misses"]:
-        lines += ["", *wrapped(line)]
-    lines += _rerun(document["rerun"])
-    return "\n".join(lines)
-
-
-def _rerun(document: Mapping[str, Any]) -> list[str]:
-    """The closed loops that were run again."""
-    if not document["joints"]:
-        return ["", *wrapped(document["remark"])] if document["remark"] else []
-    table = [["run again", "off the recording", "after", "tracking, recorded", "before", "after"]]
-    for row in document["joints"]:
-        off, track = row["deviation"], row["tracking_error"]
-        cells = [off["before"], off["after"], track["recorded"], track["before"], track["after"]]
-        table.append([row["joint"], *(f"{cell:.3g}" for cell in cells)])
-    said = (
-        "Root mean squares, rad or m, of the closed loop with the recording's reference and its "
-        f"controller ({document['controller']})."
-    )
-    return ["", *aligned(table, (1, 2, 3, 4, 5)), "", *wrapped(said)]

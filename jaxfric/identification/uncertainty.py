@@ -80,6 +80,11 @@ def places(weight: Float[Array, " J"]) -> Float[Array, " J"]:
     return (total - 0.5 * weight) / jnp.where(total[-1] > 0, total[-1], 1.0)
 
 
+def reach(off):
+    """The standard errors whose 95 % interval reaches as far as `off`, an array in any unit."""
+    return off / student_quantile(0.975, COSINES)
+
+
 class Deviations(NamedTuple):
     """How far each cosine finds the estimate from the truth, and what the rows do not determine.
 
@@ -99,8 +104,7 @@ class Deviations(NamedTuple):
 
     def beyond(self, off: Float[Array, " p"]) -> "Deviations":
         """The same with 95 % intervals that reach as far as the parameters may be off, `(p,)`."""
-        vote = off / student_quantile(0.975, COSINES)
-        return Deviations(jnp.concatenate([self.votes, vote[None, :]]), self.hidden)
+        return Deviations(jnp.concatenate([self.votes, reach(off)[None, :]]), self.hidden)
 
 
 def deviations(

@@ -71,7 +71,7 @@ def weigh(
     return Weighed(mass[0], own, through, left, columns)
 
 
-def first_weighed(
+def first_mass(
     force: Float[Array, " N"],
     velocity: Float[Array, " N"],
     slope: Float[Array, " N"],
@@ -80,8 +80,8 @@ def first_weighed(
 ) -> Float[Array, ""]:
     """The mass beside dry and viscous friction of each direction, before any fit, kg.
 
-    `slope`, the acceleration, m/s²; `wide`, its mean over other samples, which share no noise of
-    the velocity with it, as the instrument.
+    `slope`, the acceleration, m/s²; `wide`, its mean over other samples, which share no white noise
+    of the velocity with it, as its instrument: noise would make the mass of least squares small.
     """
     roots = [reduced.root(weight) for weight in (rows.positive, rows.negative)]
     friction = jnp.stack([x for root in roots for x in (root, root * velocity)], axis=1)
