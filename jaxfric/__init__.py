@@ -20,11 +20,7 @@ if TYPE_CHECKING:
     )
     from .data.io import read as read
     from .data.recording import Recording as Recording, pad as pad, stack as stack
-    from .explanation import (
-        Earlier as Earlier,
-        Explanation as Explanation,
-        explain as explain,
-    )
+    from .explanation import Earlier as Earlier, Explanation as Explanation, explain as explain
     from .identification import devices as devices
     from .identification.breakaway import BreakAway as BreakAway, breakaway as breakaway
     from .identification.constant_velocity import (

@@ -39,9 +39,7 @@ from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturb
 from .effects.position_dependent_friction import (
     PositionDependentFriction as PositionDependentFriction,
 )
-from .effects.position_dependent_inertia import (
-    PositionDependentInertia as PositionDependentInertia,
-)
+from .effects.position_dependent_inertia import PositionDependentInertia as PositionDependentInertia
 from .effects.presliding import Dahl as Dahl, LuGre as LuGre
 from .effects.springs import HardeningSpring as HardeningSpring, Spring as Spring
 from .effects.steps import (

@@ -4,9 +4,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
-from ...units import (
-    FORCE,
-)
+from ...units import FORCE
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
 from ..effect import Effect

@@ -6,10 +6,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    DIMENSIONLESS,
-    FORCE,
-)
+from ...units import DIMENSIONLESS, FORCE
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
 from ..effect import Effect, Extent

@@ -5,10 +5,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from ...units import (
-    DAMPING,
-    FORCE,
-)
+from ...units import DAMPING, FORCE
 from ..base import AbstractLaw
 from ..effect import Effect
 from ..sample import Parameter, Sample

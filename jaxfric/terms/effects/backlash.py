@@ -9,11 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...data.recording import Recording
-from ...units import (
-    FORCE,
-    POSITION,
-    VELOCITY,
-)
+from ...units import FORCE, POSITION, VELOCITY
 from ..base import AbstractTerm
 from ..effect import Effect, Extent, View, even, inside, product, scattered
 from ..presliding import AbstractStates, States, starts

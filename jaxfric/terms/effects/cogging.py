@@ -7,22 +7,11 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    DIMENSIONLESS,
-    FORCE,
-    POSITION,
-)
+from ...units import DIMENSIONLESS, FORCE, POSITION
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
 from ..effect import Effect, Extent, Waves, slowly
-from ..position import (
-    POSITION_ONLY,
-    cycles,
-    shortest,
-    stroke,
-    wave,
-    waves,
-)
+from ..position import POSITION_ONLY, cycles, shortest, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
 from ..table import reading
 

@@ -10,12 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...data.recording import Recording
-from ...units import (
-    DIMENSIONLESS,
-    FORCE,
-    FREQUENCY,
-    INERTIA,
-)
+from ...units import DIMENSIONLESS, FORCE, FREQUENCY, INERTIA
 from ..base import AbstractTerm
 from ..effect import GRID, Effect, Extent, View, inside
 from ..presliding import AbstractStates, Instant, States, starts

@@ -4,10 +4,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
-from ...units import (
-    DAMPING,
-    Dimension,
-)
+from ...units import DAMPING, Dimension
 from ..base import AbstractLaw
 from ..effect import Effect
 from ..sample import Parameter, Sample

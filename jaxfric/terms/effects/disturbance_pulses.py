@@ -8,9 +8,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from ...units import (
-    FORCE,
-)
+from ...units import FORCE
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, Residual
 from ..sample import Parameter, Sample

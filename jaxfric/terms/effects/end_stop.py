@@ -7,16 +7,10 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    POSITION,
-    STIFFNESS,
-)
+from ...units import POSITION, STIFFNESS
 from ..base import AbstractLaw
 from ..effect import Effect, Extent
-from ..position import (
-    POSITION_ONLY,
-    stroke,
-)
+from ..position import POSITION_ONLY, stroke
 from ..sample import UNKNOWN, Parameter, Sample
 
 

@@ -9,9 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...data.recording import Recording
-from ...units import (
-    TIME,
-)
+from ...units import TIME
 from ..base import AbstractTerm, joined, leaves, vector
 from ..effect import Effect, View, inside, product
 from ..friction import AbstractBump, Gaussian

@@ -5,18 +5,10 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    FORCE,
-    POSITION,
-)
+from ...units import FORCE, POSITION
 from ..base import AbstractLaw
 from ..effect import REPEATED, Effect, slowly
-from ..position import (
-    POSITION_ONLY,
-    stroke,
-    wave,
-    waves,
-)
+from ..position import POSITION_ONLY, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
 
 

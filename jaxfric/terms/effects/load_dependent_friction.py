@@ -6,9 +6,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from ...units import (
-    DIMENSIONLESS,
-)
+from ...units import DIMENSIONLESS
 from ..actuator import PREDICTED, REACTION
 from ..base import AbstractLaw
 from ..effect import Effect, Extent

@@ -7,9 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...units import (
-    FORCE,
-)
+from ...units import FORCE
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import RECURS, Effect
 from ..sample import Parameter, Sample, Scales

@@ -5,10 +5,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    FORCE,
-    FREQUENCY,
-)
+from ...units import FORCE, FREQUENCY
 from ..base import AbstractLaw
 from ..effect import RECURS, Effect, Waves
 from ..position import wave, waves

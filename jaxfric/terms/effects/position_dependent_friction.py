@@ -5,19 +5,10 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    FORCE,
-    POSITION,
-)
+from ...units import FORCE, POSITION
 from ..base import AbstractLaw
 from ..effect import SIDE, Effect, Waves, slowly
-from ..position import (
-    WITH_DIRECTION,
-    any_period,
-    cycles,
-    wave,
-    waves,
-)
+from ..position import WITH_DIRECTION, any_period, cycles, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
 
 

@@ -6,10 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...units import (
-    INERTIA,
-    POSITION,
-)
+from ...units import INERTIA, POSITION
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, View, slowly
 from ..position import any_period, cycles, wave, waves

@@ -5,11 +5,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    FORCE,
-    POSITION,
-    VELOCITY,
-)
+from ...units import FORCE, POSITION, VELOCITY
 from ..effect import Effect
 from ..presliding import AbstractBristle
 from ..sample import UNKNOWN, Parameter

@@ -5,17 +5,10 @@ from typing import ClassVar
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from ...units import (
-    POSITION,
-    STIFFNESS,
-    Dimension,
-)
+from ...units import POSITION, STIFFNESS, Dimension
 from ..base import AbstractLaw
 from ..effect import Effect
-from ..position import (
-    POSITION_ONLY,
-    within,
-)
+from ..position import POSITION_ONLY, within
 from ..sample import UNKNOWN, Parameter, Sample
 from ..text import signed
 

@@ -8,10 +8,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...units import (
-    DIMENSIONLESS,
-    TIME,
-)
+from ...units import DIMENSIONLESS, TIME
 from ..actuator import PREDICTED
 from ..base import AbstractLaw, AbstractTerm, Sum, summands
 from ..change import STEP_TIME, AbstractChange, around, course, inside_record, stepped, stepped_text

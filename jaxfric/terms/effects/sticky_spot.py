@@ -6,10 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from ...units import (
-    FORCE,
-    POSITION,
-)
+from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, View
 from ..position import WITH_DIRECTION, shortest, stroke, within

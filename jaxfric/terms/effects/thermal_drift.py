@@ -6,9 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    TIME,
-)
+from ...units import TIME
 from ..base import AbstractTerm
 from ..effect import Effect
 from ..friction import Coulomb, Viscous

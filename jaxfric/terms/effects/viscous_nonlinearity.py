@@ -6,13 +6,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import (
-    DAMPING,
-    DIMENSIONLESS,
-    FORCE,
-    VELOCITY,
-    Dimension,
-)
+from ...units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY, Dimension
 from ..base import AbstractLaw
 from ..effect import Effect
 from ..sample import UNKNOWN, Parameter, Sample
