@@ -77,9 +77,9 @@ class AbstractTerm(eqx.Module):
         """
 
     @property
-    @abstractmethod
     def inertial(self) -> bool:
         """Whether the term has momentum, so that its force contains an acceleration."""
+        return False
 
     def text(self, s: Syntax, *names: str) -> Sequence[str] | None:
         """Its columns at one sample in a language, `names` being those of β; `None` for no text.
@@ -101,12 +101,12 @@ class AbstractTerm(eqx.Module):
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         """The regressors g, one column for each affine parameter, shape `(N, p)`."""
 
-    @abstractmethod
     def momentum(self, recording: Recording) -> Float[Array, "N p"]:
         """Quantities whose time derivative adds to the columns, shape `(N, p)`.
 
         The derivative is never taken on the data: the projection puts it on its kernel.
         """
+        return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
 
     def columns_and_momentum(
         self, recording: Recording
@@ -114,17 +114,20 @@ class AbstractTerm(eqx.Module):
         """Both, which some laws find in one go; `None` for no momentum."""
         return self.columns(recording), self.momentum(recording) if self.inertial else None
 
-    @abstractmethod
     def offset(self, recording: Recording) -> Float[Array, " N"]:
         """The known part f0 of the term, N, shape `(N,)`."""
+        return jnp.zeros_like(recording.time)
 
-    @abstractmethod
     def beta(self) -> Float[Array, " d"]:
         """The nonlinear parameters as one vector, shape `(d,)`; NaN where not yet known."""
+        return vector([getattr(self, parameter.name) for parameter in self.nonlinear])
 
-    @abstractmethod
     def with_beta(self, beta: Float[Array, " d"]) -> "AbstractTerm":
         """The same term with other nonlinear parameters, `beta` of shape `(d,)`."""
+        if not self.nonlinear:
+            return self
+        names = [parameter.name for parameter in self.nonlinear]
+        return eqx.tree_at(lambda term: [getattr(term, name) for name in names], self, list(beta))
 
     def __add__(self, other: "AbstractTerm") -> "Sum":
         return Sum(summands(self) + summands(other))
@@ -157,18 +160,6 @@ class AbstractLaw(AbstractTerm):
 
     def momentum(self, recording: Recording) -> Float[Array, "N p"]:
         return _batched(self.impulse, recording)
-
-    def offset(self, recording: Recording) -> Float[Array, " N"]:
-        return jnp.zeros_like(recording.time)
-
-    def beta(self) -> Float[Array, " d"]:
-        return vector([getattr(self, parameter.name) for parameter in self.nonlinear])
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractLaw":
-        if not self.nonlinear:
-            return self
-        names = [parameter.name for parameter in self.nonlinear]
-        return eqx.tree_at(lambda term: [getattr(term, name) for name in names], self, list(beta))
 
 
 class Sum(AbstractTerm):

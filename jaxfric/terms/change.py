@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..units import TIME
-from .base import AbstractTerm, summands, vector
+from .base import AbstractTerm, summands
 from .sample import Parameter, Resolution
 from .text import Syntax, literal
 
@@ -116,15 +116,6 @@ class AbstractChange(AbstractTerm):
     def momentum(self, recording: Recording) -> Float[Array, "N p"]:
         share = stepped(recording.time, self.step_time, self.ramp)
         return share[:, None] * self.changed.momentum(recording)
-
-    def offset(self, recording: Recording) -> Float[Array, " N"]:
-        return jnp.zeros_like(recording.time)
-
-    def beta(self) -> Float[Array, " d"]:
-        return vector([self.step_time])
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractChange":
-        return eqx.tree_at(lambda term: term.step_time, self, beta[0])
 
     @property
     def switched(self) -> AbstractTerm:

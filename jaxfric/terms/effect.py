@@ -135,6 +135,11 @@ def slowly(period: str, text: str) -> Callable[[Mapping[str, float], Extent], st
     return lambda values, extent: text if values[period] * REPEATED > extent.stroke else None
 
 
+def with_parameter(name: str, text: str) -> Callable[[Mapping[str, float], Extent], str | None]:
+    """Another sentence, `text`, for a law that has the parameter `name`."""
+    return lambda values, extent: text if name in values else None
+
+
 def _as_it_is(
     term: AbstractTerm, base: AbstractTerm, turn: float | None
 ) -> tuple[AbstractTerm, ...]:

@@ -44,15 +44,8 @@ class KnownForce(AbstractTerm):
     nonlinear: ClassVar[tuple[Parameter, ...]] = ()  # type: ignore[misc]
     coordinates: ClassVar[frozenset[str]] = frozenset({KNOWN_FORCE})  # type: ignore[misc]
 
-    @property
-    def inertial(self) -> bool:
-        return False
-
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return jnp.zeros((recording.num_samples, 0), recording.time.dtype)
-
-    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return self.columns(recording)
 
     def offset(self, recording: Recording) -> Float[Array, " N"]:
         if KNOWN_FORCE not in recording.channels:
@@ -62,12 +55,6 @@ class KnownForce(AbstractTerm):
                 f"Recording(..., channels={{{KNOWN_FORCE!r}: ...}})."
             )
         return recording.channels[KNOWN_FORCE]
-
-    def beta(self) -> Float[Array, " d"]:
-        return jnp.zeros((0,))
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "KnownForce":
-        return self
 
 
 class KnownGain(AbstractLaw):

@@ -27,28 +27,9 @@ class AbstractMemory(AbstractTerm):
     coordinates: ClassVar[frozenset[str]] = frozenset({"time", "velocity"})  # type: ignore[misc]
     nonlinear: ClassVar[tuple[Parameter, ...]] = ()  # type: ignore[misc]
 
-    @property
-    def inertial(self) -> bool:
-        return False
-
     @abstractmethod
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         """The columns along the recording, `(N, p)`."""
-
-    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
-
-    def offset(self, recording: Recording) -> Float[Array, " N"]:
-        return jnp.zeros_like(recording.time)
-
-    def beta(self) -> Float[Array, " d"]:
-        values = [jnp.asarray(getattr(self, p.name)) for p in self.nonlinear]
-        return jnp.stack(values, axis=-1) if values else jnp.zeros((0,))
-
-    def with_beta(self, beta: Float[Array, " d"]) -> "AbstractMemory":
-        names = [p.name for p in self.nonlinear]
-        where = lambda term: [getattr(term, name) for name in names]  # noqa: E731
-        return eqx.tree_at(where, self, list(beta))
 
 
 def starts(recording: Recording) -> Array:

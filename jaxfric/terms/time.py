@@ -3,7 +3,6 @@
 from abc import abstractmethod
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
@@ -51,18 +50,8 @@ class AbstractModulated(AbstractTerm):
     def coordinates(self):
         return self.term.coordinates | {"time"}
 
-    @property
-    def inertial(self) -> bool:
-        return False
-
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return self.factor(recording.time)[:, None] * self.term.columns(recording)
-
-    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return self.term.momentum(recording)
-
-    def offset(self, recording: Recording) -> Float[Array, " N"]:
-        return jnp.zeros_like(recording.time)
 
     def beta(self) -> Float[Array, " d"]:
         own = vector([getattr(self, parameter.name) for parameter in self.of_time])

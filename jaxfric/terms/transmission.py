@@ -1,6 +1,7 @@
 """What lies between motor and load, as far as one mass can tell."""
 
-from typing import NamedTuple
+from abc import abstractmethod
+from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..units import ACCELERATION
-from .presliding import Instant, States, starts
+from .presliding import AbstractStates, Instant, States, starts
 from .sample import Parameter, Resolution
 
 
@@ -274,3 +275,38 @@ class DryLoad(NamedTuple):
             below = jnp.where(flank < 0, jnp.minimum(ahead, -self.half_gap), -self.half_gap)
             ahead = jnp.clip(ahead, below, above)
         return States(jnp.stack([ahead, load]), states.kept)
+
+
+class AbstractDryLoad(AbstractStates):
+    """A term that steps a load with friction of its own along the motion."""
+
+    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
+    stepped: ClassVar = True
+    swings: ClassVar = True
+
+    @property
+    @abstractmethod
+    def load(self) -> DryLoad:
+        """The load, with the term's parameters."""
+
+    @property
+    def inertial(self) -> bool:
+        return True
+
+    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
+        return self.columns_and_momentum(recording)[0]
+
+    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
+        return self.columns_and_momentum(recording)[1]
+
+    def start(self, position, velocity) -> States:
+        return self.load.start(velocity)
+
+    def rates(self, states, now):
+        return self.load.rates(states, now)
+
+    def ready(self, states, now, span):
+        return self.load.ready(states, now)
+
+    def settled(self, states, now, span):
+        return self.load.settled(states)

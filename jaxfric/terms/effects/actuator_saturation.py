@@ -1,6 +1,5 @@
 """Gain that falls at high force."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -9,7 +8,7 @@ from jaxtyping import Array, Float
 from ...units import DIMENSIONLESS, FORCE
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
-from ..effect import Effect, Extent
+from ..effect import Effect, with_parameter
 from ..sample import UNKNOWN, Parameter, Sample
 from ..table import reading
 from ..text import literal
@@ -78,15 +77,6 @@ class SoftSaturation(AbstractLaw):
         return (f"f * (1.0 / {s.raised(f'1.0 - {used}', '0.5')} - 1.0)",)
 
 
-def _variant(values: Mapping[str, float], extent: Extent) -> str | None:
-    if "saturation_level" not in values:
-        return None
-    return (
-        "The actuator gives less than commanded, the more the larger the force, and never more "
-        "than {saturation_level}: gradual saturation"
-    )
-
-
 ACTUATOR_SATURATION = Effect(
     "actuator_saturation",
     "c max(abs(f) − U, 0) sign(f), or c f (1/√(1 − (f/L)²) − 1)",
@@ -98,5 +88,9 @@ ACTUATOR_SATURATION = Effect(
     confusable_with=("gain_asymmetry", "load_dependent_friction"),
     separate_by="Repeat at half the acceleration, below the knee.",
     positive=True,
-    variant=_variant,
+    variant=with_parameter(
+        "saturation_level",
+        "The actuator gives less than commanded, the more the larger the force, and never more "
+        "than {saturation_level}: gradual saturation",
+    ),
 )

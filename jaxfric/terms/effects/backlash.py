@@ -1,6 +1,5 @@
 """A gap between motor and load."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import jax
@@ -11,10 +10,10 @@ from jaxtyping import Array, Float
 from ...data.recording import Recording
 from ...units import FORCE, POSITION, VELOCITY
 from ..base import AbstractTerm
-from ..effect import Effect, Extent, View, even, inside, product, scattered
+from ..effect import Effect, View, even, inside, product, scattered, with_parameter
 from ..presliding import AbstractStates, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, OCTAVES, DryLoad, load_motion
+from ..transmission import DECELERATION, OCTAVES, AbstractDryLoad, DryLoad, load_motion
 from .compliance import coasting
 
 
@@ -105,7 +104,7 @@ def _windup_bounds(scales):
 _FLANKS = 0.2
 
 
-class ElasticBacklash(AbstractStates):
+class ElasticBacklash(AbstractDryLoad):
     """A load behind a gap, its flanks elastic: u = f + F_L (T − sign v) − (F_L/d) dv/dt.
 
     F_L T is what the flanks push the load of friction F_L and inertia F_L/d by. Of that the
@@ -123,14 +122,6 @@ class ElasticBacklash(AbstractStates):
         Parameter("windup", POSITION, _windup_bounds, resolution=OCTAVES),
         DECELERATION,
     )
-    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
-
-    stepped: ClassVar = True
-    swings: ClassVar = True
-
-    @property
-    def inertial(self) -> bool:
-        return True
 
     def burden(self, beta, alpha) -> Burden:
         def lighter(factor: float) -> np.ndarray:
@@ -139,22 +130,15 @@ class ElasticBacklash(AbstractStates):
 
         return Burden(float(alpha[0] / beta[2]), float(alpha[0]), lighter=lighter)
 
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        return self.columns_and_momentum(recording)[0]
-
-    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
-        return self.columns_and_momentum(recording)[1]
-
     def columns_and_momentum(self, recording):
-        load = self.load_deceleration, self.half_gap, self.decay
-        held, speed = load_motion(recording, self.pace, _FLANKS, *load)
+        held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
         plain = held / self.load_deceleration - jnp.sign(motor)
         plain -= self.decay / self.load_deceleration * motor
         return plain[:, None], (speed - motor)[:, None] / self.load_deceleration
 
     @property
-    def _load(self) -> DryLoad:
+    def load(self) -> DryLoad:
         return DryLoad(self.pace, _FLANKS, self.load_deceleration, self.half_gap, self.decay)
 
     @property
@@ -178,20 +162,8 @@ class ElasticBacklash(AbstractStates):
     def pace(self):
         return jnp.sqrt(self.load_deceleration / self.windup)
 
-    def start(self, position, velocity) -> States:
-        return self._load.start(velocity)
-
     def present(self, states, now):
-        return (self._load.push(states, now.velocity) / self.load_deceleration - now.side)[None]
-
-    def rates(self, states, now):
-        return self._load.rates(states, now)
-
-    def ready(self, states, now, span):
-        return self._load.ready(states, now)
-
-    def settled(self, states, now, span):
-        return self._load.settled(states)
+        return (self.load.push(states, now.velocity) / self.load_deceleration - now.side)[None]
 
 
 def _speed_bounds(scales):
@@ -265,17 +237,6 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     return np.clip(found, *ends)
 
 
-def _flying(values: Mapping[str, float], extent: Extent) -> str | None:
-    """Another sentence for a load with a mass of its own."""
-    if "load_deceleration" not in values:
-        return None
-    return (
-        "A load with {backlash_force} of friction crosses a gap of twice {half_gap} after a "
-        "reversal, and where the motor brakes harder than the load slows down by itself, by "
-        "{load_deceleration}: backlash"
-    )
-
-
 BACKLASH = Effect(
     "backlash",
     "−F_L sign(v) inside the gap 2δ, or F_L (T − sign v) − M_L a, T what the flanks push",
@@ -295,7 +256,12 @@ BACKLASH = Effect(
     leftover=True,
     grid=gaps,
     scatter=flights,
-    variant=_flying,
+    variant=with_parameter(
+        "load_deceleration",
+        "A load with {backlash_force} of friction crosses a gap of twice {half_gap} after a "
+        "reversal, and where the motor brakes harder than the load slows down by itself, by "
+        "{load_deceleration}: backlash",
+    ),
     sizes=("backlash_force",),
     vanishes=("half_gap",),
 )

@@ -15,7 +15,7 @@ from ..base import AbstractTerm
 from ..effect import GRID, Effect, Extent, View, inside
 from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, DryLoad, load_motion
+from ..transmission import DECELERATION, AbstractDryLoad, DryLoad, load_motion
 
 
 def _resonance_bounds(scales):
@@ -150,12 +150,8 @@ class Compliance(AbstractStates):
         return jnp.concatenate([rate, -pull - dry * now.side])
 
 
-_LOAD_INERTIA, _LOAD_FRICTION = (
-    Parameter("load_inertia", INERTIA),
-    Parameter("load_friction", FORCE),
-)
-
-
+_LOAD_INERTIA = Parameter("load_inertia", INERTIA)
+_LOAD_FRICTION = Parameter("load_friction", FORCE)
 _DRIVES = {
     "inertia": (_LOAD_INERTIA,),
     "friction": (_LOAD_FRICTION,),
@@ -167,7 +163,7 @@ _DRIVES = {
 _DRY = Resolution(0, 4, None, 32)
 
 
-class DryCompliance(AbstractStates):
+class DryCompliance(AbstractDryLoad):
     """A load with dry friction on a spring and a damper: u = f + M_L (p − d sign v) − M_L dv/dt.
 
     M_L p is what the spring pushes the load by (`load_motion`): [`Compliance`][] for a load whose
@@ -184,34 +180,19 @@ class DryCompliance(AbstractStates):
         *Compliance.nonlinear[1:],
         DECELERATION,
     )
-    coordinates: ClassVar = frozenset({"position", "velocity", "time"})
-
-    stepped: ClassVar = True
-    swings: ClassVar = True
-
-    @property
-    def inertial(self) -> bool:
-        return True
 
     def burden(self, beta, alpha) -> Burden:
         resonance, _, slow = beta
         give = slow / (2 * np.pi * resonance) ** 2
         return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give)
 
-    def columns(self, recording: Recording) -> Float[Array, "N 1"]:
-        return self.columns_and_momentum(recording)[0]
-
-    def momentum(self, recording: Recording) -> Float[Array, "N 1"]:
-        return self.columns_and_momentum(recording)[1]
-
     def columns_and_momentum(self, recording):
-        load = self.damping_ratio, self.load_deceleration
-        held, speed = load_motion(recording, self.pace, *load)
+        held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
         return (held - self.load_deceleration * jnp.sign(motor))[:, None], (speed - motor)[:, None]
 
     @property
-    def _load(self) -> DryLoad:
+    def load(self) -> DryLoad:
         return DryLoad(self.pace, self.damping_ratio, self.load_deceleration)
 
     @property
@@ -230,21 +211,9 @@ class DryCompliance(AbstractStates):
     def pace(self):
         return 2 * jnp.pi * self.load_resonance
 
-    def start(self, position, velocity) -> States:
-        return self._load.start(velocity)
-
     def present(self, states, now):
-        push = self._load.push(states, now.velocity)
+        push = self.load.push(states, now.velocity)
         return (push - self.load_deceleration * now.side)[None]
-
-    def rates(self, states, now):
-        return self._load.rates(states, now)
-
-    def ready(self, states, now, span):
-        return self._load.ready(states, now)
-
-    def settled(self, states, now, span):
-        return self._load.settled(states)
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.

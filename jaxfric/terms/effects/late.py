@@ -17,33 +17,31 @@ from ..sample import Parameter, Sample
 from ..table import reading
 
 
-class TransportDelay(AbstractLaw):
+class AbstractLate(AbstractLaw):
+    """A force that acts late, to first order: f and a time times df/dt."""
+
+    coordinates: ClassVar = frozenset({PREDICTED})
+
+    def law(self, sample: Sample):
+        return (jnp.zeros_like(sample.time),)
+
+    def impulse(self, sample: Sample):
+        return (reading(sample, PREDICTED),)
+
+
+class TransportDelay(AbstractLate):
     """Force that acts τ late: u = f(t + τ) = f + τ df/dt + O(τ²): first order.
 
     The same column as [`ActuatorLag`][]; only the second order, ½ τ² d²f/dt², tells them apart.
     """
 
     affine: ClassVar = (Parameter("delay", TIME),)
-    coordinates: ClassVar = frozenset({PREDICTED})
-
-    def law(self, sample: Sample):
-        return (jnp.zeros_like(sample.time),)
-
-    def impulse(self, sample: Sample):
-        return (reading(sample, PREDICTED),)
 
 
-class ActuatorLag(AbstractLaw):
+class ActuatorLag(AbstractLate):
     """First-order lag of the force: u = f + T df/dt (exact)."""
 
     affine: ClassVar = (Parameter("lag", TIME),)
-    coordinates: ClassVar = frozenset({PREDICTED})
-
-    def law(self, sample: Sample):
-        return (jnp.zeros_like(sample.time),)
-
-    def impulse(self, sample: Sample):
-        return (reading(sample, PREDICTED),)
 
 
 FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quarter turn."

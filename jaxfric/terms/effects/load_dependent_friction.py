@@ -1,6 +1,5 @@
 """Friction that grows with the load."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -9,7 +8,7 @@ import jax.numpy as jnp
 from ...units import DIMENSIONLESS
 from ..actuator import PREDICTED, REACTION
 from ..base import AbstractLaw
-from ..effect import Effect, Extent
+from ..effect import Effect, with_parameter
 from ..sample import Parameter, Sample
 from ..table import reading
 
@@ -57,15 +56,6 @@ class ReactionFriction(AbstractLaw):
         return (f"{s.call('abs', 'r')} * {s.call('sign', 'v')}",)
 
 
-def _variant(values: Mapping[str, float], extent: Extent) -> str | None:
-    if "reaction_friction" not in values:
-        return None
-    return (
-        "Friction grows by {reaction_friction} of the force of inertia, weight and springs, which "
-        "guide or screw carry"
-    )
-
-
 LOAD_DEPENDENT_FRICTION = Effect(
     "load_dependent_friction",
     "μ abs(N) sign(v)",
@@ -81,5 +71,9 @@ LOAD_DEPENDENT_FRICTION = Effect(
     confusable_with=("gain_asymmetry", "actuator_saturation"),
     separate_by="Record the load, or repeat with another payload.",
     positive=True,
-    variant=_variant,
+    variant=with_parameter(
+        "reaction_friction",
+        "Friction grows by {reaction_friction} of the force of inertia, weight and springs, which "
+        "guide or screw carry",
+    ),
 )

@@ -12,7 +12,7 @@ from ...units import DIMENSIONLESS, TIME
 from ..actuator import PREDICTED
 from ..base import AbstractLaw, AbstractTerm, Sum, summands
 from ..change import STEP_TIME, AbstractChange, around, course, inside_record, stepped, stepped_text
-from ..effect import GRID, Effect, Extent, View, even
+from ..effect import GRID, Effect, Extent, View, even, with_parameter
 from ..friction import Coulomb
 from ..inertia import Inertia, Offset
 from ..known import KnownColumns
@@ -162,15 +162,6 @@ def _changes(term: FrictionStep | FrictionRamp, view: View) -> np.ndarray:
     return np.array(pairs)
 
 
-def _gradual(values: Mapping[str, float], extent: Extent) -> str | None:
-    if "step_duration" not in values:
-        return None
-    return (
-        "Coulomb friction changes by {step_coulomb} in the course of {step_duration}, about "
-        "t = {step_time}"
-    )
-
-
 FRICTION_STEP = Effect(
     "friction_step",
     "ΔF sign(v) 1(t > t_c)",
@@ -183,7 +174,11 @@ FRICTION_STEP = Effect(
     separate_by="Repeat from cold: warming repeats, a step does not.",
     momentary=True,
     grid=_changes,
-    variant=_gradual,
+    variant=with_parameter(
+        "step_duration",
+        "Coulomb friction changes by {step_coulomb} in the course of {step_duration}, about "
+        "t = {step_time}",
+    ),
     moment="step_time",
 )
 
