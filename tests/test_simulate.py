@@ -17,7 +17,8 @@ from jaxfric.data.recording import Recording
 from jaxfric.simulation.control import PD, PID, Cascade, Encoder
 from jaxfric.simulation.errors import relative_error
 from jaxfric.simulation.prediction import predict
-from jaxfric.simulation.simulating import default_substeps, simulate
+from jaxfric.simulation.simulating import simulate
+from jaxfric.simulation.substeps import default_substeps
 from jaxfric.terms import AbstractLaw, Parameter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
 

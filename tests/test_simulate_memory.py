@@ -12,7 +12,7 @@ import jaxfric as jf
 from jaxfric import terms
 from jaxfric.simulation import prediction
 from jaxfric.simulation.errors import force_error, in_motion
-from jaxfric.simulation.simulating import default_substeps
+from jaxfric.simulation.substeps import default_substeps
 from jaxfric.terms.base import Sum, summands
 from jaxfric.terms.effects import EFFECTS, compliance
 from jaxfric.units import FORCE, STIFFNESS

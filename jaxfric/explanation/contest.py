@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable
-from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,8 @@ from .evidence import Evidence
 from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains
-from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, adjusted, blocks, thresholds
+from .scanning import scanned
+from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, blocks, thresholds
 from .spectral_lines import fast_tone
 from .threads import each
 
@@ -111,7 +111,7 @@ def contest(
     bootstrap = BlockBootstrap(current, block, seed)
 
     candidates = field.candidates
-    scans, p_values = _scanned(bootstrap, field, seen)
+    scans, p_values = scanned(bootstrap, field, seen)
     least = thresholds(np.array([s.drawn for s in scans]), LEVEL)
     trials = [
         _trial(candidate, scan, float(p), float(limit))
@@ -134,52 +134,6 @@ def contest(
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
     finalists = _finals(seen, current, field, eligible, size, within_reach)
     return Contest(trials, finalists, size)
-
-
-def _scanned(
-    bootstrap: BlockBootstrap, field: CandidateSet, seen: Evidence
-) -> tuple[list[Scan], np.ndarray]:
-    """The scans of all candidates, group by group, and their p-values, `(C,)`.
-
-    Where one is significant the residual is no noise. Then those that remove more and are not are
-    scanned again as beside structure.
-    """
-
-    def first(group: list[Candidate]) -> list[Scan]:
-        pairs = zip(group, field.columns(group, seen), strict=True)
-        return [bootstrap(columns, one.effect.positive) for one, columns in pairs]
-
-    groups = each(first, field.groups)
-    scans = list(chain.from_iterable(groups))
-    p_values = _p_values(scans)
-    known = [s.gain[s.best] for s, p_value in zip(scans, p_values, strict=True) if p_value <= LEVEL]
-    if not known:
-        return scans, p_values
-    doubtful = {
-        id(scan)
-        for scan, p_value in zip(scans, p_values, strict=True)
-        if p_value > LEVEL and scan.gain[scan.best] > max(known)
-    }
-
-    def again(pair: tuple[list[Candidate], list[Scan]]) -> list[Scan]:
-        group, own = pair
-        if doubtful.isdisjoint(map(id, own)):
-            return own
-        every = zip(group, own, field.columns(group, seen), strict=True)
-        return [
-            bootstrap.beside_structure(scan, columns, one.effect.positive)
-            if id(scan) in doubtful
-            else scan
-            for one, scan, columns in every
-        ]
-
-    scans = list(chain.from_iterable(each(again, zip(field.groups, groups, strict=True))))
-    return scans, _p_values(scans)
-
-
-def _p_values(scans: list[Scan]) -> np.ndarray:
-    """p-values of the best group of each scan, corrected for all of them, `(C,)`."""
-    return adjusted(np.array([s.gain[s.best] for s in scans]), np.array([s.drawn for s in scans]))
 
 
 def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Trial:

@@ -1,6 +1,5 @@
 """What an explanation says of a simulator, written into the simulator's own file."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,7 +10,6 @@ import numpy as np
 from ..data.recording import Recording
 from ..explanation import Explanation
 from ..explanation.attributes import CONSTANT, GAIN
-from ..explanation.errors import through_kernel
 from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..simulators import Mujoco, actuation
@@ -19,10 +17,10 @@ from ..simulators.loading import library
 from ..simulators.patching import Patched, folder_of, patched
 from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
-from ..terms.base import Sum, summands
+from ..terms.base import AbstractTerm, Sum
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
-from . import callback
+from . import callback, readback
 from .errors import from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
@@ -145,11 +143,11 @@ def _confirmed(
     """The forces of a joint beside the file that make its held-out recording no worse."""
     if model is None or len(recordings) < 2 or not able:
         return list(able)
-    pair = _pair(source, text, joint, recordings, {})
+    both = readback.pair(source, text, joint, recordings, {})
 
     def error(some: Sequence[Part]) -> float:
         forces = callback.only(model, some) if some else None
-        return reached(_errors(told, *pair, recordings, forces)[HELD])
+        return reached(readback.errors(told, *both, recordings, forces)[readback.HELD])
 
     return kept(able, error)
 
@@ -204,23 +202,9 @@ def _read_again(source, text: str, found, recordings, models) -> dict[str, dict[
     errors: dict[str, dict[str, Any]] = {}
     shared: dict[bytes, Any] = {}
     for joint, told in found.items():
-        pair = _pair(source, text, joint, recordings[joint], shared)
-        errors[joint] = _errors(told, *pair, recordings[joint], models.get(joint))
+        both = readback.pair(source, text, joint, recordings[joint], shared)
+        errors[joint] = readback.errors(told, *both, recordings[joint], models.get(joint))
     return errors
-
-
-def _pair(source, text: str, joint: str, recordings, shared) -> tuple[Mujoco, Mujoco]:
-    """The simulators of a joint by the file as it was, and by a text."""
-    commanded = _commanded(recordings[0])
-    return (
-        Mujoco(source, joint, shared=shared, commanded=commanded),
-        Mujoco(text, joint, folder_of(source), shared, commanded=commanded),
-    )
-
-
-def _commanded(recording: Recording) -> bool:
-    """Whether a recording is of the actuator's command."""
-    return actuation.COMMAND in recording.channels
 
 
 def _put_right(source, joint: str, told: Explanation):
@@ -303,52 +287,20 @@ def _unwritten(joint: str, moved) -> str:
 
 def _beside(told: Explanation) -> Model | None:
     """What was found beside attributes: the terms, and a constant force that no spring makes."""
-    kept, alphas, start, model = [], [], 0, told.model
-    for term in summands(model.term):
-        alpha = np.asarray(model.alpha[start : start + len(term.affine)])
-        start += len(term.affine)
+    sprung = CONSTANT not in _moved(told)
+
+    def beside(term: AbstractTerm) -> bool:
+        constant = [p.name for p in term.affine] == [CONSTANT]
         known = isinstance(term, KnownForce | KnownColumns)
-        sprung = [p.name for p in term.affine] == [CONSTANT] and CONSTANT not in _moved(told)
-        if not known and not sprung and not traits(term).late and np.any(alpha):
-            kept.append(term)
-            alphas.append(alpha)
+        return not known and not (constant and sprung) and not traits(term).late
+
+    kept = [(term, alpha) for term, alpha in told.model.pairs() if beside(term) and np.any(alpha)]
     if not kept:
         return None
-    return Model(Sum(tuple(kept)), jnp.asarray(np.concatenate(alphas)), model.units)
+    terms, alphas = zip(*kept, strict=True)
+    return Model(Sum(terms), jnp.concatenate(alphas), told.model.units)
 
 
 def _speed(recording: Recording) -> float:
     moved = np.abs(np.diff(np.asarray(recording.position, float)))
     return float(np.quantile(moved / np.diff(np.asarray(recording.time, float)), 0.98))
-
-
-# The figures by recording.
-HELD = "holdout_force_error"
-FIGURES = ("force_error", HELD)
-
-
-def _errors(told: Explanation, before: Mujoco, after: Mujoco, recordings, forces: Model | None):
-    """The force errors through the kernel: before, of the file, and with the forces beside it."""
-    delay = told.fit["filtered_force_error"]["force_taken_later"]
-    found = {}
-    for name, log in zip(FIGURES, recordings, strict=False):
-        made = _made(before, after, log)
-        error = {
-            "before": through_kernel(before.baseline(log.units), before.beside(log), delay),
-            "file": through_kernel(after.baseline(log.units), after.beside(made), delay),
-        }
-        if forces is not None:
-            model = Model(Sum((KnownForce(), *summands(forces.term))), forces.alpha, log.units)
-            error["forces"] = through_kernel(model, after.beside(made), delay)
-        found[name] = error
-    return found
-
-
-def _made(before: Mujoco, after: Mujoco, log: Recording) -> Recording:
-    """The recording with the joint's force that the model after makes of the command."""
-    if after.actuator is not None:
-        return after.driven(dataclasses.replace(log, force=log.channels[actuation.COMMAND]))
-    gear = 1.0
-    if GAIN in after.attributes() and after.attributes()[GAIN].what == "gear":
-        gear = before.attributes()[GAIN].value / after.attributes()[GAIN].value
-    return dataclasses.replace(log, force=log.force / gear)

@@ -18,13 +18,12 @@ from ..looks import html, text
 from ..looks.text import Block, Table
 from ..terms import bristles
 from ..terms.base import AbstractTerm, Sum, summands
-from ..units import DAMPING, SI, STIFFNESS, spell
+from ..terms.vectors import split
+from ..units import SI, spell
 from . import saved
 from .structures import name_of
 
 SCHEMA = "jaxfric.model/1"
-# Their names and dimensions: force, position, time.
-_BRISTLES = {"stiffness": STIFFNESS, "damping": DAMPING}
 
 
 class Model(eqx.Module):
@@ -98,8 +97,7 @@ class Model(eqx.Module):
 
     def only(self, kept: Callable[[AbstractTerm], bool]) -> "Model":
         """The model of some of its terms, at least one."""
-        pairs = zip(summands(self.term), self.alphas(), strict=True)
-        terms, alphas = zip(*((t, a) for t, a in pairs if kept(t)), strict=True)
+        terms, alphas = zip(*((t, a) for t, a in self.pairs() if kept(t)), strict=True)
         return dataclasses.replace(self, term=Sum(terms), alpha=jnp.concatenate(alphas))
 
     def with_bristles(self, stiffness: float, damping: float = 0.0) -> "Model":
@@ -182,7 +180,7 @@ class Model(eqx.Module):
             levels = zip(("backward", "forward"), self.breakaway, strict=True)
             document["breakaway"] = {way: saved.known(level) for way, level in levels}
         if self.bristles is not None:
-            values = zip(_BRISTLES.items(), self.bristles, strict=True)
+            values = zip(saved.BRISTLES.items(), self.bristles, strict=True)
             document["bristles"] = {
                 name: {"value": float(value), "unit": spell(dimension, dict(self.units))}
                 for (name, dimension), value in values
@@ -213,11 +211,15 @@ class Model(eqx.Module):
                 f"The model document is damaged: {shown} is missing or misplaced."
             ) from error
         model = from_parameters(term, values, saved.units_of(document.get("units", {})))
-        model = _with_levels(model, document.get("breakaway"))
-        model = _with_bristles(model, document.get("bristles"))
-        limit, delay = (_number(document, name) for name in ("force_limit", "force_delay"))
-        model = model if limit is None else model.with_force_limit(limit)
-        return model if delay is None else model.with_force_delay(delay)
+        if (levels := saved.levels(document)) is not None:
+            model = model.with_breakaway(*levels)
+        if (stiffness := saved.bristles(document)) is not None:
+            model = model.with_bristles(*stiffness)
+        if (limit := saved.quantity(document, "force_limit")) is not None:
+            model = model.with_force_limit(limit)
+        if (delay := saved.quantity(document, "force_delay")) is not None:
+            model = model.with_force_delay(delay)
+        return model
 
     def __repr__(self) -> str:
         return text.shown(self, _blocks)
@@ -227,11 +229,13 @@ class Model(eqx.Module):
 
     def alphas(self) -> list[Float[Array, " q"]]:
         """The affine parameters of each summand, in order."""
-        start, parts = 0, []
-        for term in summands(self.term):
-            parts.append(self.alpha[start : start + len(term.affine)])
-            start += len(term.affine)
-        return parts
+        return [alpha for _, alpha in self.pairs()]
+
+    def pairs(self) -> list[tuple[AbstractTerm, Float[Array, " q"]]]:
+        """Each summand with its affine parameters, in order."""
+        terms = summands(self.term)
+        alphas = split(self.alpha, [len(term.affine) for term in terms])
+        return list(zip(terms, alphas, strict=True))
 
 
 def weighed(
@@ -249,7 +253,7 @@ def _slip_friction(model: Model, velocity: Float[Array, "*shape"]) -> Float[Arra
     flat = jnp.ravel(velocity)
     motion = Recording(time=jnp.zeros_like(flat), force=jnp.zeros_like(flat), velocity=flat)
     total = jnp.zeros_like(flat)
-    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+    for term, alpha in model.pairs():
         if term.coordinates <= {"velocity"}:
             total = total + weighed(term.columns(motion), alpha) + term.offset(motion)
     return jnp.reshape(total, velocity.shape)
@@ -318,40 +322,3 @@ def load(text: str) -> Model:
     if isinstance(document, dict) and document.get("schema") != SCHEMA and "model" in document:
         document = document["model"]
     return Model.from_dict(document)
-
-
-def _with_levels(model: Model, levels: Any) -> Model:
-    """The model with the break-away levels of a document, where it has any."""
-    if levels is None:
-        return model
-    if not isinstance(levels, Mapping):
-        raise ValueError(f"The model document's breakaway is {short(repr(levels))}, no pair.")
-    pair = [saved.number(f"breakaway {way}", levels.get(way)) for way in ("backward", "forward")]
-    return model.with_breakaway(*pair)
-
-
-def _with_bristles(model: Model, values: Any) -> Model:
-    """The model with the bristles of a document, where it has any."""
-    if values is None:
-        return model
-    try:
-        pair = [saved.number(name, values[name]["value"]) for name in _BRISTLES]
-    except (KeyError, TypeError) as error:
-        raise ValueError(
-            f"The model document's bristles are {short(repr(values))}: stiffness and damping, "
-            "each with its value, belong there."
-        ) from error
-    return model.with_bristles(*pair)
-
-
-def _number(document: Mapping[str, Any], name: str) -> float | None:
-    """A number of a document with its unit, where it has one of that name."""
-    value = document.get(name)
-    if value is None:
-        return None
-    if not isinstance(value, Mapping) or "value" not in value:
-        raise ValueError(
-            f"The model document's {name} is {short(repr(value))}: a number with its value belongs "
-            "there."
-        )
-    return saved.number(name, value["value"])

@@ -13,7 +13,10 @@ from .. import terms as laws
 from ..data.printable import short
 from ..terms.base import AbstractTerm, Directional, Sum
 from ..terms.effects import law_named
-from ..units import SI
+from ..units import DAMPING, SI, STIFFNESS
+
+# What is saved of bristles, and its dimension.
+BRISTLES = {"stiffness": STIFFNESS, "damping": DAMPING}
 
 
 def term_to_dict(term: AbstractTerm) -> dict[str, Any]:
@@ -58,6 +61,43 @@ def number(name: str, value: Any) -> float:
         return float(value)
     shown = short(repr(value))
     raise ValueError(f"Parameter {name} of the model document must be a number, not {shown}.")
+
+
+def quantity(document: Mapping[str, Any], name: str) -> float | None:
+    """A number of a document with its unit, where it has one of that name."""
+    value = document.get(name)
+    if value is None:
+        return None
+    if not isinstance(value, Mapping) or "value" not in value:
+        raise ValueError(
+            f"The model document's {name} is {short(repr(value))}: a number with its value belongs "
+            "there."
+        )
+    return number(name, value["value"])
+
+
+def levels(document: Mapping[str, Any]) -> list[float] | None:
+    """The break-away levels of a document, backward and forward, where it has any."""
+    found = document.get("breakaway")
+    if found is None:
+        return None
+    if not isinstance(found, Mapping):
+        raise ValueError(f"The model document's breakaway is {short(repr(found))}, no pair.")
+    return [number(f"breakaway {way}", found.get(way)) for way in ("backward", "forward")]
+
+
+def bristles(document: Mapping[str, Any]) -> list[float] | None:
+    """Stiffness and damping of the bristles of a document, where it has any."""
+    found = document.get("bristles")
+    if found is None:
+        return None
+    try:
+        return [number(name, found[name]["value"]) for name in BRISTLES]
+    except (KeyError, TypeError) as error:
+        raise ValueError(
+            f"The model document's bristles are {short(repr(found))}: stiffness and damping, "
+            "each with its value, belong there."
+        ) from error
 
 
 def units_of(units: Any) -> dict[str, str]:

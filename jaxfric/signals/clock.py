@@ -1,5 +1,7 @@
 """The clock of a recording: the typical interval, and which samples belong together."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,9 +13,9 @@ from ..data.recording import Recording
 GAP_FACTOR = 5.0
 
 
-def is_traced(recording: Recording) -> bool:
-    """Whether any signal is an abstract value inside jit, vmap or grad."""
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(recording))
+def is_traced(tree: Any) -> bool:
+    """Whether any leaf, a signal of a recording, is an abstract value inside jit, vmap or grad."""
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
 
 
 def interval(recording: Recording) -> Float[Array, ""]:

@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 
 from ..models import Model
 from ..terms.actuator import PREDICTED, REACTION
-from ..terms.base import Sum, summands
+from ..terms.base import Sum
 from ..terms.effects import traits
 from ..units import DIMENSIONLESS
 from .plant import Scalar, Surroundings, slowest
@@ -121,7 +121,7 @@ def parted(model: Model, interval: float | None) -> tuple[Model, Actuator | None
 
     `interval`: the shortest time between samples, s; `None` inside `jax.jit`.
     """
-    pairs = list(zip(summands(model.term), model.alphas(), strict=True))
+    pairs = model.pairs()
     if model.force_limit is None and not any(PREDICTED in t.coordinates for t, _ in pairs):
         return model, None
     times = {"delay": jnp.zeros_like(model.alpha[0]), "lag": jnp.zeros_like(model.alpha[0])}
@@ -161,7 +161,7 @@ def check(model: Model) -> None:
     """Raise `ValueError` for a law that needs less than a tenth of a force as its command, or for
     friction that takes all of its load.
     """
-    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+    for term, alpha in model.pairs():
         if REACTION in term.coordinates and not float(jnp.max(jnp.abs(alpha))) < 1:
             raise ValueError(
                 f"{term.affine[0].name} is {float(alpha[0]):.3g}: an axis whose friction is all of "

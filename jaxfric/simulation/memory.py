@@ -75,7 +75,7 @@ class Augmented(eqx.Module):
     parts: tuple[tuple[AbstractStates, Float[Array, " p"]], ...]
 
     def __init__(self, model: Model):
-        pairs = list(zip(summands(model.term), model.alphas(), strict=True))
+        pairs = model.pairs()
         kept = [(t, a) for t, a in pairs if not _held(t)]
         alpha = jnp.concatenate([a for _, a in kept])
         # Bristles stand for the break-away levels.

@@ -225,7 +225,7 @@ def _smoothing_of_loads(model: Model, motion: Prepared, prepared: Recording):
     """
     total = jnp.zeros_like(prepared.time)
     between = jnp.where(starts(prepared), 0.0, jnp.diff(prepared.time, prepend=prepared.time[:1]))
-    for term, alpha in zip(summands(model.term), model.alphas(), strict=True):
+    for term, alpha in model.pairs():
         if not _stepped(term):
             continue
         inertia = jnp.stack([*map(jnp.asarray, term.shed)]) @ alpha

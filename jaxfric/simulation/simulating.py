@@ -1,7 +1,6 @@
 """Forward in time: an axis, its friction exact about sticking, in closed or open loop."""
 
 import dataclasses
-import math
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -11,23 +10,14 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from .. import signals
-from ..data.recording import Recording, described, require
-from ..models import Model, require as require_model
+from ..data.recording import Recording
+from ..models import Model
 from . import actuator as faults
+from .checking import check, check_memory
 from .control import AbstractController, Encoder, Feedback
-from .memory import Augmented, carried, holds, lost, rigid
-from .plant import Plant, Surroundings, slowest
-
-# Between two samples the actuator force is constant, so the acceleration changes only as fast as
-# the terms let it: at their rates λ = |∂F/∂v|/M and √(|∂F/∂x|/M). A midpoint step of h = 0.1/λ
-# errs by (hλ)³/6, which over a time constant (ten steps) is 0.2 % of the motion.
-RATE_PER_STEP = 0.1
-# Bounds the cost where a friction curve is (nearly) vertical beside zero velocity.
-MOST_SUBSTEPS = 64
-# Inside jax.jit the rates are not known when the program is built.
-TRACED_SUBSTEPS = 8
-# Speeds, relative to the fastest of the reference, at which the rates are looked at.
-_SPEEDS = tuple(10.0 ** (-k / 2) for k in range(9))
+from .plant import Surroundings
+from .setpoint import set_point
+from .substeps import cast, default_substeps, plant_of
 
 
 class _Held(NamedTuple):
@@ -108,12 +98,12 @@ def simulate(
     noise without a key, an actuator that gives next to nothing of its command, a load that is
     heavier than the axis, or for a term with a memory of another kind.
     """
-    _check(model, reference, controller, encoder, force_noise, key)
-    _check_memory(model, smooth)
+    check(model, reference, controller, encoder, force_noise, key)
+    check_memory(model, smooth)
     if substeps is None:
         substeps = default_substeps(model, reference, smooth)
     force_key, encoder_key = (None, None) if key is None else jax.random.split(key)
-    model, controller, encoder = _cast((model, controller, encoder), reference.time.dtype)
+    model, controller, encoder = cast((model, controller, encoder), reference.time.dtype)
     held = _held(reference, controller, encoder, encoder_key, initial)
     model, actuator = faults.parted(model, _shortest(model, held))
     smooth = None if smooth is None else jnp.asarray(smooth, reference.time.dtype)
@@ -134,98 +124,6 @@ def simulate(
     )
 
 
-def _check(model, reference, controller, encoder, force_noise, key):
-    require_model(model, "simulate")
-    require(reference, "simulate")
-    if not isinstance(controller, AbstractController | None):
-        raise ValueError(
-            f"controller is {described(controller)}; give jaxfric.PD(...), PID(...), Cascade(...), "
-            "one of your own, or None for an open loop."
-        )
-    name = reference.source or "the reference"
-    aimless = reference.position is None and "reference" not in reference.channels
-    if controller is not None and aimless:
-        raise ValueError(
-            f"simulate with a controller needs a set-point; {name} has neither a channel "
-            "'reference' nor a position. Add one, or leave out the controller to drive by force."
-        )
-    if lacking := [] if _traced(model) else _lacking(model):
-        raise ValueError(
-            f"simulate needs every parameter, and the model has no value for {', '.join(lacking)}, "
-            "which its recording did not show. Record motion in both directions, or give them: "
-            "model.with_parameters({...})."
-        )
-    if not _traced(model):
-        faults.check(model)
-    if not _traced((model, reference)) and _massless(model, reference):
-        if load := carried(model):
-            raise ValueError(
-                f"simulate moves motor and load each by its own inertia, and a load of {load:.4g} "
-                "leaves the motor none of the model's. Give it less, or identify the model anew."
-            )
-        raise ValueError(
-            "simulate needs an inertia to accelerate, and the model's is not positive: it has "
-            f"{', '.join(model.parameters)}. Add jaxfric.terms.Inertia() with a positive mass."
-        )
-    noisy = _positive(force_noise) or (encoder is not None and _positive(encoder.noise))
-    if noisy and key is None:
-        raise ValueError("simulate with noise needs a key=jax.random.key(seed) to draw it from.")
-
-
-def _check_memory(model, smooth):
-    if unheld := lost(model):
-        raise ValueError(
-            "simulate holds a memory whose states follow the motion, and "
-            f"{', '.join(unheld)} gives none. Derive it from jaxfric.terms.AbstractStates, or "
-            "simulate without that term."
-        )
-    if smooth is not None and holds(model):
-        raise ValueError(
-            "smooth= blends friction that is a function of the velocity; the model has a memory "
-            "(bristles, a load, a gap or a lag). Leave smooth out."
-        )
-
-
-def _positive(value) -> bool:
-    return not isinstance(value, jax.core.Tracer) and bool(np.any(np.asarray(value) > 0))
-
-
-def _lacking(model) -> list[str]:
-    """The parameters without a finite value."""
-    with jax.ensure_compile_time_eval():
-        return [n for n, value in model.parameters.items() if not np.isfinite(np.asarray(value))]
-
-
-def _massless(model, reference) -> bool:
-    if not rigid(model):
-        return True
-    # Inside jax.jit a computation on known numbers is put off too, unless one insists.
-    with jax.ensure_compile_time_eval():
-        return not bool(np.all(np.asarray(_rates(model, reference, None)[0]) > 0))
-
-
-def _traced(tree) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(tree))
-
-
-def _cast(tree, dtype):
-    """Every floating-point leaf in the recording's precision."""
-
-    def cast(leaf):
-        inexact = eqx.is_array_like(leaf) and jnp.issubdtype(jnp.asarray(leaf).dtype, jnp.floating)
-        return jnp.asarray(leaf, dtype) if inexact else leaf
-
-    return jax.tree.map(cast, tree)
-
-
-def _slope(time, signal, together):
-    """Difference quotient over both neighbours, or over the one that belongs to the segment."""
-    steps = jnp.where(together, jnp.diff(time), 0.0)
-    rises = jnp.where(together, jnp.diff(signal), 0.0)
-    span = jnp.pad(steps, (1, 0)) + jnp.pad(steps, (0, 1))
-    return (jnp.pad(rises, (1, 0)) + jnp.pad(rises, (0, 1))) / jnp.where(span > 0, span, 1.0)
-
-
 def _held(reference, controller, encoder, key, initial) -> _Held:
     time, dtype = reference.time, reference.time.dtype
     together = reference.segment[1:] == reference.segment[:-1]
@@ -233,7 +131,7 @@ def _held(reference, controller, encoder, key, initial) -> _Held:
     # The last force of a segment moves nothing that is recorded.
     interval = jnp.pad(steps, (0, 1))
     zeros = jnp.zeros_like(time)
-    goal, goal_velocity = _set_point(reference, controller, together)
+    goal, goal_velocity = set_point(reference, controller, together)
     first, first_velocity = (goal, goal_velocity) if initial is None else initial
     restart = jnp.pad(~together, (1, 0), constant_values=True)
     return _Held(
@@ -250,20 +148,9 @@ def _held(reference, controller, encoder, key, initial) -> _Held:
     )
 
 
-def _set_point(reference, controller, together):
-    given = reference.channels
-    if controller is not None and "reference" in given:
-        goal, velocity = given["reference"], given.get("reference_velocity")
-    elif reference.position is not None:
-        goal, velocity = reference.position, reference.velocity
-    else:
-        goal, velocity = jnp.zeros_like(reference.time), reference.velocity
-    return goal, _slope(reference.time, goal, together) if velocity is None else velocity
-
-
 def _shortest(model, held: _Held) -> float | None:
     """The shortest time between two samples, s; `None` inside `jax.jit`."""
-    if _traced((model, held)):
+    if signals.is_traced((model, held)):
         return None
     steps = np.asarray(held.interval)
     return float(np.min(steps, where=steps > 0, initial=np.max(steps)))
@@ -272,7 +159,7 @@ def _shortest(model, held: _Held) -> float | None:
 @eqx.filter_jit
 def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
     """Force, position and velocity at every sample, each `(N,)`: one scan, compiled once."""
-    plant = _plant(model, smooth)
+    plant = plant_of(model, smooth)
 
     def advance(state, now):
         fresh = _fresh(plant, actuator, controller, encoder, now)
@@ -309,11 +196,6 @@ def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
     return jax.lax.scan(advance, first, held)[1]
 
 
-def _plant(model, smooth):
-    """The plant of a model: with states for its memory where it has any."""
-    return Augmented(model) if holds(model) else Plant(model, smooth)
-
-
 def _fresh(plant, actuator, controller, encoder, now):
     """The state at the start of a segment."""
     x, v = now.initial_position, now.initial_velocity
@@ -331,43 +213,3 @@ def _seen_velocity(state, measured, encoder, now):
     known = elapsed > 0
     difference = (measured - state.measured) / jnp.where(known, elapsed, 1.0)
     return jnp.where(known, difference, now.initial_velocity)
-
-
-def default_substeps(
-    model: Model, reference: Recording, smooth: float | Float[Array, ""] | None = None
-) -> int:
-    """Integration steps a sample that make the midpoint rule accurate to a few parts in a thousand.
-
-    The sampling interval times the fastest rate of the model at positions and (down to a ten
-    thousandth of) velocities of the reference, over 0.1; between 1 and 64. Inside `jax.jit`: 8.
-    """
-    if _traced((model, reference, smooth)):
-        return TRACED_SUBSTEPS
-    with jax.ensure_compile_time_eval():
-        mass, slopes = _rates(model, reference, smooth)
-        damping, stiffness = (jnp.nan_to_num(jnp.abs(slope)) / mass for slope in slopes)
-        rate = jnp.max(jnp.maximum(damping, jnp.sqrt(stiffness)))
-        steps = float(signals.interval(reference) * rate) / RATE_PER_STEP
-    if not math.isfinite(steps):
-        return MOST_SUBSTEPS
-    return min(max(math.ceil(steps), 1), MOST_SUBSTEPS)
-
-
-@eqx.filter_jit
-def _rates(model, reference, smooth):
-    """Inertia, ∂F/∂v and ∂F/∂x at states of the reference, each `(256, 2 speeds + 1)`."""
-    dtype = reference.time.dtype
-    axis = model.without("predicted_")
-    model, smooth = _cast((axis, None if smooth is None else jnp.asarray(smooth)), dtype)
-    plant = _plant(model, smooth)
-    together = reference.segment[1:] == reference.segment[:-1]
-    goal, velocity = _set_point(reference, True, together)
-    speeds = jnp.nanmax(jnp.abs(velocity)) * jnp.asarray(_SPEEDS, dtype)
-    speeds = jnp.maximum(speeds, slowest(dtype))
-    rest = [] if smooth is None else [jnp.zeros(1, dtype)]
-    grid = jnp.concatenate([speeds, -speeds, *rest])
-    chosen = jnp.linspace(0, goal.shape[0] - 1, 256).astype(int)
-    channels = {name: channel[chosen] for name, channel in reference.channels.items()}
-    each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
-    surroundings = Surroundings(reference.time[chosen], channels)
-    return jax.vmap(each_speed, in_axes=(0, None, 0))(goal[chosen], grid, surroundings)

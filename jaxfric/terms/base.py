@@ -19,6 +19,7 @@ from ..data.recording import Recording
 from ..units import POSITION
 from .sample import Burden, Parameter, Sample, Scales, samples
 from .text import Syntax
+from .vectors import joined, split, vector
 
 
 class AbstractTerm(eqx.Module):
@@ -203,7 +204,7 @@ class Sum(AbstractTerm):
     def with_beta(self, beta: Float[Array, " d"]) -> "Sum":
         counts = [len(term.nonlinear) for term in self.terms]
         return Sum(
-            tuple(t.with_beta(b) for t, b in zip(self.terms, _split(beta, counts), strict=True))
+            tuple(t.with_beta(b) for t, b in zip(self.terms, split(beta, counts), strict=True))
         )
 
 
@@ -256,7 +257,7 @@ class Directional(AbstractTerm):
         return joined([self.positive.beta(), self.negative.beta()])
 
     def with_beta(self, beta: Float[Array, " d"]) -> "Directional":
-        positive, negative = _split(
+        positive, negative = split(
             beta, [len(self.positive.nonlinear), len(self.negative.nonlinear)]
         )
         return Directional(self.positive.with_beta(positive), self.negative.with_beta(negative))
@@ -323,31 +324,6 @@ def bounds(
 
 def _batched(body, recording: Recording) -> Float[Array, "N p"]:
     return jax.vmap(lambda sample: vector(body(sample)))(samples(recording))
-
-
-def vector(values) -> Float[Array, " k"]:
-    """Numbers as one vector; a batch of each as a batch of vectors."""
-    if values and all(isinstance(v, np.ndarray | np.generic) for v in values):
-        return np.stack(values, axis=-1)
-    return jnp.stack([jnp.asarray(v) for v in values], axis=-1) if values else _nothing()
-
-
-def _nothing() -> np.ndarray:
-    """No number, in jax's default precision; of numpy, so that nothing is compiled."""
-    return np.zeros((0,), jax.dtypes.canonicalize_dtype(float))
-
-
-def joined(vectors) -> Float[Array, " k"]:
-    """Vectors as one; batches of each as a batch."""
-    full = [each for each in vectors if each.shape[-1]]
-    if full and all(isinstance(each, np.ndarray) for each in full):
-        return np.concatenate(full, axis=-1)  # of what was moved to numpy nothing is compiled
-    return jnp.concatenate(full, axis=-1) if full else _nothing()
-
-
-def _split(vector, counts):
-    ends = [sum(counts[: i + 1]) for i in range(len(counts))]
-    return [vector[end - count : end] for end, count in zip(ends, counts, strict=True)]
 
 
 def _signed(parameters, sign):

@@ -6,9 +6,10 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from .base import AbstractTerm, joined, vector
+from .base import AbstractTerm
 from .sample import Parameter
 from .text import Syntax
+from .vectors import joined, vector
 
 
 class AbstractModulated(AbstractTerm):

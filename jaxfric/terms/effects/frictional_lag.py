@@ -10,11 +10,12 @@ from jaxtyping import Array, Float
 
 from ...data.recording import Recording
 from ...units import TIME
-from ..base import AbstractTerm, joined, leaves, vector
+from ..base import AbstractTerm, leaves
 from ..effect import Effect, View, inside, product
 from ..friction import AbstractBump, Gaussian
 from ..presliding import AbstractStates, Instant, States, low_pass, starts
 from ..sample import UNKNOWN, Burden, Parameter
+from ..vectors import joined, vector
 
 
 def _memory_bounds(scales):
