@@ -19,9 +19,10 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from mistakes import Case, hunt, mistake_of, report, summary
+
 from jaxfric.cli import _configure, main as command
 from jaxfric.data.io import write_text
-from jaxfric.validation.hunt import Case, hunt, mistake_of, report, summary
 from jaxfric.validation.proof.workers import work
 
 # A case takes a second or two; one that takes this long hangs.

@@ -17,12 +17,13 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import comparing
+import planting
 import recordings
 
 from jaxfric.cli import _configure, options, values
 from jaxfric.data.io import write_text
 from jaxfric.validation import proof
-from jaxfric.validation.proof import comparing, planting
 from jaxfric.validation.proof.writing import rates, table
 
 METHOD = """\

@@ -4,7 +4,7 @@ import math
 import os
 from pathlib import Path
 
-from jaxfric.validation.proof.planting import Log
+from planting import Log
 
 EMPS = {"columns": {"force": "vir", "position": "qm"}, "scale": {"force": 35.15065}}
 SERVO = {"units": {"force": "N·m", "position": "rad"}}

@@ -1,25 +1,19 @@
 """Mistakes in logs: that they are made as drawn, judged rightly, and not answered in silence."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from jaxfric import cli
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.validation.hunt import (
-    MISTAKES,
-    Case,
-    bench,
-    cases,
-    hunt,
-    judging,
-    logs,
-    running,
-    sources,
-    tallies,
-)
-from jaxfric.validation.hunt.judging import Ran
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+
+from mistakes import MISTAKES, Case, bench, cases, hunt, judging, logs, running, sources, tallies
+from mistakes.judging import Ran
 
 # Kinds of which one case each is run here, on the same machine; all kinds in the slow test.
 QUICK = (

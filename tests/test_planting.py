@@ -11,10 +11,12 @@ import pytest
 import jaxfric as jf
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.validation import proof
-from jaxfric.validation.proof import comparing, planting, trials
+from jaxfric.validation.proof import trials
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
+import comparing
+import planting
 import real_proof
 
 LOGS = [planting.Log(name, f"{name}.csv", None, "coulomb-viscous", {}) for name in ("a-b", "c")]

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ... import signals
-from ...data.recording import Recording
+from jaxfric import signals
+from jaxfric.data.recording import Recording
+
 from . import judging
 from .cases import Case, Made, make
 from .judging import Ran, Verdict

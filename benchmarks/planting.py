@@ -15,18 +15,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ... import signals
-from ...data.io import read, write_text
-from ...data.recording import Recording
-from ...explanation.motion import from_position
-from ...identification.documents import to_json
-from ...identification.identifying import identify
-from ..concealed.kinds import kind, names
-from ..concealed.machines import Plan
-from ..concealed.nominal import Nominal
-from .planning import Case, turns
-from .running import LIMIT, claim, do_all
-from .trials import ANSWERS, SEALED, answered, failed, fingerprint, path, plain
+from jaxfric import signals
+from jaxfric.data.io import read, write_text
+from jaxfric.data.recording import Recording
+from jaxfric.explanation.motion import from_position
+from jaxfric.identification.documents import to_json
+from jaxfric.identification.identifying import identify
+from jaxfric.validation.concealed.kinds import kind, names
+from jaxfric.validation.concealed.machines import Plan
+from jaxfric.validation.concealed.nominal import Nominal
+from jaxfric.validation.proof.planning import Case, turns
+from jaxfric.validation.proof.running import LIMIT, claim, do_all
+from jaxfric.validation.proof.trials import (
+    ANSWERS,
+    SEALED,
+    answered,
+    failed,
+    fingerprint,
+    path,
+    plain,
+)
 
 
 def planted() -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.random import Generator
 
-from .. import concealed
+from jaxfric.validation import concealed
+
 from . import bench, joint, library
 from .logs import PLAIN, TRUE_VELOCITY, Log, Pair
 

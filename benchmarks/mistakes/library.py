@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.random import Generator
 
-from ... import models
-from ...data.recording import Recording
-from ...simulation import control
-from ...simulation.simulating import simulate
+from jaxfric import models
+from jaxfric.data.recording import Recording
+from jaxfric.simulation import control
+from jaxfric.simulation.simulating import simulate
+
 from . import motions
 from .logs import PLAIN, TRUE_VELOCITY, Log, Pair, log_uniform
 

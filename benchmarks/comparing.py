@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..concealed.kinds import unrepeated
-from .planning import Case
-from .scoring import Score, held_out, score
-from .trials import ANSWERS, SEALED, failed, path, read
+from jaxfric.validation.concealed.kinds import unrepeated
+from jaxfric.validation.proof.planning import Case
+from jaxfric.validation.proof.scoring import Score, held_out, score
+from jaxfric.validation.proof.trials import ANSWERS, SEALED, failed, path, read
 
 # Parameters that say where a finding is: two with others are two findings.
 PLACES = ("pitch", "unbalance_period", "friction_period", "inertia_period", "frequency",
