@@ -10,21 +10,10 @@ def whole() -> argparse.ArgumentParser:
     """The parser with all commands."""
     made, commands = parser()
     for each in (
-        _add_demo,
-        _add_identify,
-        _add_explain,
-        _add_predict,
-        _add_simulate,
-        _add_export,
-        _add_models,
-        _add_effects,
-        _add_fleet,
-        _add_prove,
-        _add_design,
-        _add_select,
-        _add_watch,
+        _add_demo, _add_identify, _add_explain, _add_predict, _add_simulate, _add_export,
+        _add_models, _add_effects, _add_fleet, _add_prove, _add_design, _add_select, _add_watch,
         _add_presliding,
-    ):
+    ):  # fmt: skip
         each(commands)
     return made
 
@@ -43,7 +32,7 @@ def _add_demo(commands) -> None:
 
 def _add_identify(commands) -> None:
     command = add(commands, "identify", "commands.identify", "friction of one or many recordings")
-    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+    options.recordings(command)
     command.add_argument(
         "--model",
         default="gaussian",
@@ -56,9 +45,7 @@ def _add_identify(commands) -> None:
         action="store_true",
         help="find by how much the force acts after its time stamp, and take it into account",
     )
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write the identification; - prints it"
-    )
+    options.document(command, "the identification")
     command.add_argument(
         "--save", type=values.output, metavar="MODEL.json", help="write the identified model"
     )
@@ -94,9 +81,7 @@ def _add_explain(commands) -> None:
     command.add_argument(
         "--simulate", action="store_true", help="run the models forward too, before and after"
     )
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write the explanation; - prints it"
-    )
+    options.document(command, "the explanation")
     command.add_argument(
         "--report", type=values.output, metavar="OUT.html", help="write a page (extra: report)"
     )
@@ -151,7 +136,7 @@ def _add_predict(commands) -> None:
     command = add(commands, "predict", "commands.predict", "the force that a recorded motion needs")
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="FILE", help="the recording")
-    command.add_argument("-o", "--out", type=values.table, required=True, metavar="OUT.csv")
+    options.table(command)
     options.reading(command)
 
 
@@ -159,7 +144,7 @@ def _add_simulate(commands) -> None:
     command = add(commands, "simulate", "simulate.run", "run a model forward, with stick and slip")
     command.add_argument("model", metavar="MODEL.json")
     command.add_argument("file", metavar="REFERENCE.csv", help="set-point, or force, over time")
-    command.add_argument("-o", "--out", type=values.table, required=True, metavar="OUT.csv")
+    options.table(command)
     command.add_argument(
         "--controller",
         type=values.controller,
@@ -175,9 +160,7 @@ def _add_simulate(commands) -> None:
         help="add feed-forward by the model that the drive has (default: by the machine's own), "
         "and say how much tracking error and controller force that removes",
     )
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write that benefit; - prints it"
-    )
+    options.document(command, "that benefit")
     options.reading(command)
 
 
@@ -250,20 +233,16 @@ def _add_design(commands) -> None:
         "model", metavar="MODEL.json", help="a model; or an explanation, whose rivals to separate"
     )
     options.designing(command)
-    command.add_argument("-o", "--out", type=values.table, required=True, metavar="OUT.csv")
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write the prediction; - prints it"
-    )
+    options.table(command)
+    options.document(command, "the prediction")
 
 
 def _add_select(commands) -> None:
     command = add(
         commands, "select", "commands.selection", "which friction model a recording supports"
     )
-    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write the standings; - prints them"
-    )
+    options.recordings(command)
+    options.document(command, "the standings", "them")
     options.reading(command)
 
 
@@ -271,7 +250,7 @@ def _add_watch(commands) -> None:
     command = add(commands, "watch", "watch.run", "parameters and changes as data arrive")
     command.add_argument("file", metavar="FILE", help="a CSV that grows, or - for standard input")
     options.watching(command)
-    options.following(command)
+    options.columns(command)
 
 
 def _add_presliding(commands) -> None:
@@ -286,9 +265,7 @@ def _add_presliding(commands) -> None:
         help="the friction that they bend, and all else: a name that jaxfric models lists, or a "
         "saved model, whose parameters are refitted (default: coulomb-viscous)",
     )
-    command.add_argument(
-        "--json", type=values.output, metavar="OUT", help="write what was found; - prints it"
-    )
+    options.document(command, "what was found")
     command.add_argument(
         "--save", type=values.output, metavar="MODEL.json", help="write the model with bristles"
     )

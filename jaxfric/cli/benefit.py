@@ -11,12 +11,12 @@ from ..identification import documents
 from ..models import Model
 from ..simulation.compensation import ASSUMED, Benefit, benefit, usual
 from ..simulation.control import AbstractController
-from .commands import _load, put, put_table
+from .commands import load_model, put, put_table
 
 
 def simulated(model: Model, reference: Recording, controller, notes, arguments) -> int:
     """`simulate --compensate`: the benefit said, as JSON, and the run with it as a table."""
-    drive = _load(arguments.compensate) if arguments.compensate else model
+    drive = load_model(arguments.compensate) if arguments.compensate else model
     try:
         found, chosen = computed(model, reference, controller, drive)
     except ValueError as error:

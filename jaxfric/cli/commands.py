@@ -17,7 +17,7 @@ import numpy as np
 from .. import models as known
 from ..data import summary
 from ..data.excerpt import MOST, excerpt
-from ..data.io import read_with_notes, write_bytes, write_table, write_text
+from ..data.io import READING, read_with_notes, write_bytes, write_table, write_text
 from ..data.printable import printable
 from ..data.recording import Recording, uniform
 from ..data.targets import standard
@@ -43,18 +43,12 @@ def read(path: str, arguments: Namespace, **more: Any) -> tuple[Recording, list[
     """The recording in a file, as the reading options say; what serves as what, and what was put in
     order.
     """
-    return read_with_notes(
-        path,
-        columns=arguments.columns,
-        scale=arguments.scale,
-        units=arguments.units,
-        period=arguments.period,
-        repair=arguments.repair,
-        rate=arguments.rate,
-        counts_per_rev=arguments.counts_per_rev,
-        served=True,
-        **more,
-    )
+    return read_with_notes(path, **({"served": True} | reading(arguments) | more))
+
+
+def reading(arguments: Namespace) -> dict[str, Any]:
+    """How a file is read, as the reading options say."""
+    return {name: getattr(arguments, name) for name in READING}
 
 
 def stated(recording: Recording) -> str:
@@ -248,9 +242,9 @@ def predict(arguments: Namespace) -> int:
 
     The force error is that of the rows in which the column `in_motion` is 1.
     """
-    model = _load(arguments.model)
+    model = load_model(arguments.model)
     recording, notes = read(arguments.file, arguments)
-    recording = _in_units(recording, model, arguments)
+    recording = in_units(recording, model, arguments)
     needed = model.term.coordinates - {"acceleration", "time", "position", "velocity"}
     needed -= {PREDICTED, REACTION}  # predict works it out
     if missing := sorted(needed - set(recording.channels)):
@@ -296,7 +290,8 @@ def _unknown(model: Model, blank: np.ndarray, moving: np.ndarray, arguments) -> 
     ]
 
 
-def _load(path: str) -> Model:
+def load_model(path: str) -> Model:
+    """A saved model."""
     try:
         return known.load(Path(path).read_text(encoding="utf-8"))
     except (ValueError, UnicodeDecodeError) as error:
@@ -305,7 +300,7 @@ def _load(path: str) -> Model:
         ) from None
 
 
-def _in_units(recording: Recording, model: Model, arguments: Namespace) -> Recording:
+def in_units(recording: Recording, model: Model, arguments: Namespace) -> Recording:
     """The recording under the model's unit names; refused where it states another unit.
 
     A file that states no unit is read in N and m; what is no statement gives way.

@@ -14,13 +14,13 @@ from ..identification.separation import separate
 from ..looks.text import Table, text
 from ..models import Model
 from ..terms.effects import effect
-from .commands import _load, put, put_table
+from .commands import load_model, put, put_table
 from .messages import say
 
 
 def run(arguments: Namespace) -> int:
     """Propose a reference for a model, or for the confusable findings of an explanation."""
-    model = _load(arguments.model)
+    model = load_model(arguments.model)
     if arguments.interval >= 0.01 * arguments.duration:
         raise ValueError("--interval is longer than a hundredth of --duration: sample faster.")
     limits = Limits(

@@ -16,13 +16,13 @@ from ..explanation.quantities import per_pole_pair
 from ..identification import documents, tabulate
 from ..identification.constant_velocity import held
 from ..identification.uncertainty import Estimate
-from ..models import Model, load, named
+from ..models import Model, named
 from ..report import page
 from ..simulators import Known, same_motion
 from ..terms import KNOWN_FORCE
 from ..terms.effects import EFFECTS
 from . import benefit, robot
-from .commands import put, read, today, working
+from .commands import load_model, put, read, today, working
 from .messages import say
 from .saving import saved
 
@@ -150,7 +150,7 @@ def _simulation(
 def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Recording, list[str]]:
     """Another recording of the comparison, in the units of the first, and its notes."""
     scale = arguments.scale | arguments.other_scale
-    other, notes = read(path, Namespace(**vars(arguments) | {"scale": scale}))
+    other, notes = read(path, arguments, scale=scale)
     units = recording.unit_names
     scaled = {role: units[role] for role in arguments.other_scale if role in units}
     other = dataclasses.replace(other, units=tuple((other.unit_names | scaled).items()))
@@ -179,12 +179,7 @@ def _baseline(
             return Earlier(other)
         named(text)
         return text
-    try:
-        model = load(Path(text).read_text(encoding="utf-8"))
-    except (ValueError, UnicodeDecodeError) as error:
-        raise ValueError(
-            f"{text}: {error} A model is written by jaxfric identify --save."
-        ) from None
+    model = load_model(text)
     try:
         baseline_of(model)
     except ValueError as error:

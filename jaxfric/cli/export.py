@@ -9,18 +9,18 @@ from ..data.targets import standard
 from ..export import Exported, export
 from ..models import Model
 from ..units import VELOCITY, spell
-from .commands import _in_units, _load, put, read
+from .commands import in_units, load_model, put, read
 from .messages import say
 
 
 def run(arguments: Namespace) -> int:
     """Write the model's text, and say what its form costs."""
-    model = _load(arguments.model)
+    model = load_model(arguments.model)
     worth = ""
     if arguments.reference:
         from . import benefit
 
-        reference = _in_units(
+        reference = in_units(
             read(arguments.reference, arguments, set_point=True)[0], model, arguments
         )
         worth = "\n" + benefit.exported(model, reference, arguments)

@@ -13,7 +13,7 @@ from .. import fleet
 from ..data.io import write_bytes
 from ..data.targets import same
 from ..fleet import journal, running, tables, telling
-from .commands import check_bounds, show_progress
+from .commands import check_bounds, reading, show_progress
 from .messages import say
 
 
@@ -67,18 +67,8 @@ def _files(arguments: Namespace) -> list[fleet.File]:
 
 
 def _options(arguments: Namespace) -> fleet.Options:
-    return fleet.Options(
-        arguments.model,
-        arguments.projection,
-        arguments.bounds,
-        arguments.columns,
-        arguments.scale,
-        arguments.units,
-        arguments.period,
-        arguments.repair,
-        arguments.rate,
-        arguments.counts_per_rev,
-    )
+    how = arguments.model, arguments.projection, arguments.bounds
+    return fleet.Options(*how, **reading(arguments))
 
 
 def _jobs(arguments: Namespace) -> int:

@@ -5,20 +5,8 @@ import os
 from argparse import ArgumentParser, Namespace
 
 from ..data.targets import replaced, same, standard
-from .values import (
-    bounds,
-    count,
-    factors,
-    names,
-    number,
-    output,
-    picture,
-    positive,
-    process,
-    rate,
-    seconds,
-    sizes,
-)
+from . import values
+from .values import count, factors, names, number, output, picture, positive, seconds
 
 # What the options of every command read, and what they write.
 READ = (
@@ -51,9 +39,24 @@ def _kept(path: str) -> bool:
     return standard(path) or replaced(path) is not None
 
 
+def recordings(command: ArgumentParser) -> None:
+    """Add the files of a command that takes one or many."""
+    command.add_argument("files", nargs="+", metavar="FILE", help="CSV, Parquet, .mat or .npz")
+
+
+def document(command: ArgumentParser, what: str, it: str = "it") -> None:
+    """Add where JSON is written to, and what it holds."""
+    command.add_argument("--json", type=output, metavar="OUT", help=f"write {what}; - prints {it}")
+
+
+def table(command: ArgumentParser) -> None:
+    """Add where a table is written to."""
+    command.add_argument("-o", "--out", type=values.table, required=True, metavar="OUT.csv")
+
+
 def reading(command: ArgumentParser) -> None:
     """Add the options that say how to read a file."""
-    group = _columns(command)
+    group = columns(command)
     group.add_argument(
         "--period",
         type=factors,
@@ -63,7 +66,7 @@ def reading(command: ArgumentParser) -> None:
     )
     group.add_argument(
         "--rate",
-        type=rate,
+        type=values.rate,
         metavar="HZ",
         help="samples per second of a file without a time column",
     )
@@ -82,8 +85,8 @@ def reading(command: ArgumentParser) -> None:
     )
 
 
-def _columns(command: ArgumentParser):
-    """The options that say which columns, in which units."""
+def columns(command: ArgumentParser):
+    """Add the options that say which columns, in which units; returns their group."""
     group = command.add_argument_group("how to read the file")
     group.add_argument(
         "--columns",
@@ -108,11 +111,6 @@ def _columns(command: ArgumentParser):
         help="after scaling; they name, they do not convert",
     )
     return group
-
-
-def following(command: ArgumentParser) -> None:
-    """Add the options that say how to read a stream."""
-    _columns(command)
 
 
 def watching(command: ArgumentParser) -> None:
@@ -190,7 +188,7 @@ def identifying(command: ArgumentParser) -> None:
     )
     command.add_argument(
         "--bounds",
-        type=bounds,
+        type=values.bounds,
         default={},
         metavar="NAME=LOW:HIGH,…",
         help="of nonlinear parameters, for instance stribeck_velocity+=0.001:0.1",
@@ -228,7 +226,7 @@ def gathering(command: ArgumentParser) -> None:
     )
     command.add_argument(
         "--process",
-        type=process,
+        type=values.process,
         metavar="I/N@HOST:PORT",
         help="the I-th, from 0, of N such commands on machines that share the folders; "
         "process 0 is reached at HOST:PORT",
@@ -248,7 +246,7 @@ def proving(command: ArgumentParser) -> None:
     )
     command.add_argument(
         "--size",
-        type=sizes,
+        type=values.sizes,
         default=(0.02, 0.30),
         metavar="LOW:HIGH",
         help="of the concealed force, in parts of the Coulomb level (default: 0.02:0.3)",

@@ -17,7 +17,7 @@ from ..models import name_of, named
 from ..simulation.errors import force_error
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.presliding import AbstractBristle
-from .commands import _load, put, read, working
+from .commands import load_model, put, read, working
 from .messages import say
 from .saving import saved
 
@@ -52,7 +52,7 @@ def run(arguments: Namespace) -> int:
 
 def _structure(model: str) -> AbstractTerm:
     """The sum of a name or of a saved model, without bristles of its own."""
-    term = _load(model).term if os.path.isfile(model) else named(model)
+    term = load_model(model).term if os.path.isfile(model) else named(model)
     return Sum(tuple(each for each in summands(term) if not isinstance(each, AbstractBristle)))
 
 

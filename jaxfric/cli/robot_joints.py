@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data.io import read_with_notes
 from ..data.joints import COMMAND, references_of
 from ..data.recording import Recording
 from ..data.tables import load
@@ -163,27 +162,20 @@ def _log(
         columns = dict(arguments.columns)
         if COMMAND in columns:
             columns["force"] = columns.pop(COMMAND)
-        given = Namespace(**vars(arguments) | {"units": units, "columns": columns})
-        log, notes = read(path, given)
-    else:
-        others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
-        roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
-        if COMMAND in roles:
-            roles["force"] = roles.pop(COMMAND)
-        wanted = references_of(load(Path(path)).columns, list(own), arguments.columns)
-        if name in wanted:
-            roles["reference"] = wanted[name]
-        for role in ("time", "segment"):
-            if role in arguments.columns:
-                roles[role] = arguments.columns[role]
-        if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:
-            roles["segment"] = "segment"
-        turned = arguments.scale.get("position")
-        turns = [*others, *(["reference"] if name in wanted else [])]
-        scale = arguments.scale | ({} if turned is None else dict.fromkeys(turns, turned))
-        log, notes = read_with_notes(
-            path, columns=roles, scale=scale, units=units, period=arguments.period,
-            repair=arguments.repair, rate=arguments.rate,
-            counts_per_rev=arguments.counts_per_rev,
-        )  # fmt: skip
-    return log, notes
+        return read(path, arguments, units=units, columns=columns)
+    others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
+    roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
+    if COMMAND in roles:
+        roles["force"] = roles.pop(COMMAND)
+    wanted = references_of(load(Path(path)).columns, list(own), arguments.columns)
+    if name in wanted:
+        roles["reference"] = wanted[name]
+    for role in ("time", "segment"):
+        if role in arguments.columns:
+            roles[role] = arguments.columns[role]
+    if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:
+        roles["segment"] = "segment"
+    turned = arguments.scale.get("position")
+    turns = [*others, *(["reference"] if name in wanted else [])]
+    scale = arguments.scale | ({} if turned is None else dict.fromkeys(turns, turned))
+    return read(path, arguments, columns=roles, scale=scale, units=units, served=False)

@@ -7,19 +7,19 @@ import numpy as np
 from ..simulation import control
 from ..simulation.simulating import simulate
 from . import benefit
-from .commands import _in_units, _load, put_table, read, stated
+from .commands import in_units, load_model, put_table, read, stated
 
 
 def run(arguments: Namespace) -> int:
     """`jaxfric simulate`: motion and force of a model, as a table."""
-    model = _load(arguments.model)
+    model = load_model(arguments.model)
     controller = None
     if arguments.controller:
         kinds = {"pd": control.PD, "pid": control.PID, "cascade": control.Cascade}
         kind, gains = arguments.controller
         controller = kinds[kind](**gains)
     reference, notes = read(arguments.file, arguments, set_point=True)
-    reference = _in_units(reference, model, arguments)
+    reference = in_units(reference, model, arguments)
     if arguments.compensate is not None:
         return benefit.simulated(model, reference, controller, notes, arguments)
     if arguments.json:

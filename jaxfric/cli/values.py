@@ -49,22 +49,22 @@ def factors(text: str) -> dict[str, float]:
 
 def bounds(text: str) -> dict[str, tuple[float, float]]:
     """`a=low:high,…` as a mapping to pairs of numbers."""
-    found = {}
-    for name, span in names(text).items():
-        low, colon, high = span.partition(":")
-        limits = (number(low), number(high)) if colon else (1.0, 0.0)
-        if not limits[0] < limits[1]:
-            raise ArgumentTypeError(f"{name}={span} is not of the form NAME=LOW:HIGH")
-        found[name] = limits
-    return found
+    return {
+        name: _ordered(limits, f"{name}={limits} is not of the form NAME=LOW:HIGH")
+        for name, limits in names(text).items()
+    }
 
 
 def span(text: str) -> tuple[float, float]:
     """`low:high` as a pair of numbers, the second the larger."""
+    return _ordered(text, f"{text!r} is not of the form LOW:HIGH")
+
+
+def _ordered(text: str, fault: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     limits = (number(low), number(high)) if colon else (1.0, 0.0)
     if not limits[0] < limits[1]:
-        raise ArgumentTypeError(f"{text!r} is not of the form LOW:HIGH")
+        raise ArgumentTypeError(fault)
     return limits
 
 
@@ -144,10 +144,7 @@ def _over_zero(text: str, wanted: str) -> float:
 
 def rate(text: str) -> float:
     """Samples per second, over zero."""
-    value = number(text)
-    if value <= 0:
-        raise ArgumentTypeError(f"{text!r} is not a number of samples per second over zero")
-    return value
+    return _over_zero(text, "a number of samples per second over zero")
 
 
 def process(text: str) -> tuple[int, int, str]:

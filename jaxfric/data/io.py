@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from . import columns as names, stamps
-from .cleaning import clean
+from .cleaning import Clean, clean
 from .clocked import CLOCK, clocked
 from .delimited import Table, numbers
 from .per_second import per_second
@@ -25,6 +25,8 @@ from .writing import (
     write_text as write_text,
 )
 
+# What says how a file is read, as a command and a fleet hand it on.
+READING = ("columns", "scale", "units", "period", "repair", "rate", "counts_per_rev")
 _SIGNALS = ("time", "force", "position", "velocity")
 
 
@@ -137,7 +139,11 @@ def read_with_notes(
             scaled["position"] = scaled.get("reference", np.zeros_like(scaled["time"]))
     notes += tidy.notes
     scaled["time"] = _exact_time(scaled["time"], tidy.segment, notes, source)
-    recording = Recording(
+    return _recording(tidy, scaled, named, path, source), notes
+
+
+def _recording(tidy: Clean, scaled, named, path: Path, source: str) -> Recording:
+    return Recording(
         **{role: scaled[role] for role in _SIGNALS if role in scaled},
         mask=tidy.mask,
         segment=tidy.segment,
@@ -147,7 +153,6 @@ def read_with_notes(
         sha256=sha256(path),
         position_every=tidy.position_every,
     )
-    return recording, notes
 
 
 def _check_arguments(chosen, scale, units, period, source) -> None:

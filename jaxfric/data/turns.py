@@ -3,10 +3,8 @@
 import math
 from collections.abc import Mapping
 
+from ..units import TURNS
 from .columns import stated_unit
-
-# One revolution in each unit of an angle.
-REVOLUTION = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
 
 
 def angles(
@@ -30,10 +28,10 @@ def angles(
     if not (math.isfinite(counts) and counts > 0):
         raise ValueError(f"{source}: {counts} counts per revolution; give a number over zero.")
     unit = units.get("position", "rad")
-    if unit not in REVOLUTION:
+    if unit not in TURNS:
         raise ValueError(
             f"{source}: counts per revolution make an angle, which {unit} is not. Name "
-            f"{', '.join(REVOLUTION)} (--units position=rev), or use --scale."
+            f"{', '.join(TURNS)} (--units position=rev), or use --scale."
         )
     found = dict(scale)
     turning = [role for role in ("position", "reference", "velocity") if role in chosen]
@@ -50,7 +48,7 @@ def angles(
                 f"{source}: the column {chosen[role]!r} is in {stated}, not in counts. Leave "
                 f"--counts-per-rev away, or name another column: --columns {role}=NAME."
             )
-        found[role] = REVOLUTION[unit] / counts
+        found[role] = TURNS[unit] / counts
     if not turning:
         raise ValueError(f"{source}: no position is read that could be in counts.")
     return found, dict(units) | {"position": unit}

@@ -10,10 +10,10 @@ import os
 import shutil
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from ..data.provenance import versions
 from .files import File
 
 SCHEMA = "jaxfric.fleet/2"
@@ -66,7 +66,7 @@ class Journal:
 
     def __init__(self, out: str | os.PathLike, task: Mapping[str, Any], part: int = 0):
         self.folder = folder(out)
-        self._task = {"schema": SCHEMA, "jaxfric": _version(), "task": _plain(task)}
+        self._task = {"schema": SCHEMA, "jaxfric": versions()["jaxfric"], "task": _plain(task)}
         self._path = self.folder / f"rows-{part}.jsonl"
 
     def __enter__(self) -> "Journal":
@@ -176,10 +176,3 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
         return f"another version of jaxfric ({theirs.get('jaxfric')})"
     pairs = ((name, theirs["task"].get(name), value) for name, value in ours["task"].items())
     return ", ".join(f"{name} {old}, not {new}" for name, old, new in pairs if old != new)
-
-
-def _version() -> str:
-    try:
-        return version("jaxfric")
-    except PackageNotFoundError:
-        return ""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import jax
 
 from .. import models
+from ..data.io import READING
 from ..data.tables import optional
 from ..identification import devices
 from .batches import Batches, failed
@@ -37,8 +38,7 @@ class Options(NamedTuple):
     @property
     def reading(self) -> dict[str, Any]:
         """The arguments of [`jaxfric.read`][]."""
-        names = ("columns", "scale", "units", "period", "repair", "rate", "counts_per_rev")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in READING}
 
 
 def run(
