@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Sequence
-from itertools import groupby
+from textwrap import indent
 
 from ..models import Model
-from .outcome import Exported, ForceError
-from .parts import Divided, Line, Part, constants, divided, levels, lines, unwritten
+from .outcome import Exported, exact
+from .parts import Divided, Line, Part, constants, divided, levels, lines, stated, unwritten
 from .syntax import C, identifier, literal
 
 _KEYWORDS = set(
@@ -25,19 +25,17 @@ def export(model: Model, name: str = "axis") -> Exported:
     """
     check_name(name)
     taken, missing = divided(model), unwritten(model)
-    written = [row for row in constants(model) if row[0] in taken.parameters]
     text = "\n".join(
         (
             _head(model, name, missing),
-            _constants([*written, *levels(model)]),
+            _constants([*constants(model, taken), *levels(model)]),
             C.helpers["sign_of"],
             _friction(model, name, taken.slip),
             _force(model, name, taken),
             *_stick(model, name),
         )
     )
-    unit = dict(model.units)["force"]
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing)
+    return Exported(text, exact(model), missing)
 
 
 def check_name(name: str) -> None:
@@ -145,16 +143,12 @@ def _reaction(borne: Sequence[Part] | None) -> str:
 
 def body(some: Sequence[Part]) -> str:
     """The statements that add the force of some summands to `u`."""
-    return "".join(f"    /* {part.name} */\n{_statements(lines(C, part))}" for part in some)
+    texts = (stated(lines(C, part), _added, "if (v {} 0.0) {{\n", "}\n") for part in some)
+    return "".join(
+        f"    /* {part.name} */\n{indent(text, '    ')}"
+        for part, text in zip(some, texts, strict=True)
+    )
 
 
-def _statements(products: tuple[Line, ...]) -> str:
-    text = ""
-    for side, group in groupby(products, lambda line: line.side):
-        sums = [f"u += {identifier(line.parameter)} * {line.column};\n" for line in group]
-        if side:
-            inner = "".join(f"        {row}" for row in sums)
-            text += f"    if (v {'>' if side == '+' else '<'} 0.0) {{\n{inner}    }}\n"
-        else:
-            text += "".join(f"    {row}" for row in sums)
-    return text
+def _added(line: Line) -> str:
+    return f"u += {identifier(line.parameter)} * {line.column};\n"

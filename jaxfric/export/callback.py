@@ -1,15 +1,15 @@
 """Python that adds to a MuJoCo simulation what its joints have no attribute for."""
 
 from collections.abc import Sequence
-from itertools import groupby
 from pathlib import Path
+from textwrap import indent
 
 import jax.numpy as jnp
 import numpy as np
 
 from ..models import Model
 from ..terms.base import Sum
-from .parts import Line, Part, lines, parts
+from .parts import Line, Part, lines, parts, stated
 from .syntax import PYTHON, identifier, literal
 
 # What MuJoCo knows at the moment at which it asks for passive forces.
@@ -83,17 +83,10 @@ def force_{identifier(name)}(x, v, t):
 
 
 def _statements(part: Part) -> str:
-    text = ""
-    for side, group in groupby(lines(PYTHON, part), lambda line: line.side):
-        text += _sided(side, list(group))
-    return text
+    def added(line: Line) -> str:
+        return f"u += {identifier(line.parameter)} * {line.column}\n"
 
-
-def _sided(side: str, products: Sequence[Line]) -> str:
-    indent = "    "
-    head = f"    if v {'>' if side == '+' else '<'} 0.0:\n" if side else ""
-    inner = indent * (2 if side else 1)
-    return head + "".join(f"{inner}u += {identifier(p.parameter)} * {p.column}\n" for p in products)
+    return indent(stated(lines(PYTHON, part), added, "if v {} 0.0:\n", ""), "    ")
 
 
 def told(model: Model) -> tuple[list[Part], list[Part]]:

@@ -10,8 +10,8 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from ..models import Model
 from . import c
-from .outcome import Exported, ForceError
-from .parts import constants, divided, levels, unwritten
+from .outcome import Exported, exact
+from .parts import constants, divided, unwritten, without_levels
 from .syntax import C, identifier, literal
 
 SOURCE = "fmu.c"
@@ -35,21 +35,19 @@ def export(model: Model, name: str = "axis") -> Exported:
     guid = "{" + hashlib.sha256(str(sorted(values.items())).encode()).hexdigest()[:32] + "}"
     text = _filled(values | {"guid": guid})
     description = _description(model, name, guid)
-    unit = dict(model.units)["force"]
-    held = [f"{key} {value:.4g} {unit}" for key, value, _ in levels(model)]
     remarks = (
         "Source code: tools that load compiled FMUs only take it after a C compiler has been over "
         "it, for instance by fmpy: fmpy compile FILE.",
-        *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held),
+        *without_levels(model),
     )
     data = _archive({"modelDescription.xml": description, f"sources/{SOURCE}": text})
-    missing = unwritten(model)
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing, remarks, data=data)
+    return Exported(text, exact(model), unwritten(model), remarks, data=data)
 
 
 def _source(model: Model, name: str) -> dict[str, str]:
     """What the C text of the FMU says of this model."""
-    taken, known = divided(model), _held(model)
+    taken = divided(model)
+    known = constants(model, taken)
     first = len(INPUTS) + len(OUTPUTS)
     rows = [
         f"    const double {identifier(key)} = real[{first + i}];\n"
@@ -68,12 +66,6 @@ def _source(model: Model, name: str) -> dict[str, str]:
         "friction": c.body(taken.slip),
         "rest": c.whole(taken),
     }
-
-
-def _held(model: Model) -> list[tuple[str, float, str]]:
-    """Name, value and unit of the parameters that the FMU holds."""
-    written = divided(model).parameters
-    return [row for row in constants(model) if row[0] in written]
 
 
 def _filled(values: Mapping[str, str]) -> str:
@@ -137,7 +129,7 @@ def _variables(model: Model) -> list[dict[str, str]]:
             "start": literal(value),
             "description": key,
         }
-        for key, value, unit in _held(model)
+        for key, value, unit in constants(model, divided(model))
     ]
     return rows
 

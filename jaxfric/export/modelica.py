@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..models import Model
-from .outcome import Exported, ForceError
+from .outcome import Exported, exact
 from .parts import Line, Part, constants, divided, levels, lines, unwritten
 from .syntax import MODELICA, identifier, literal
 
@@ -32,13 +32,13 @@ def export(model: Model, name: str = "axis") -> Exported:
     if not re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) or name in _KEYWORDS | _OWN:
         raise ValueError(f"{name!r} cannot name a block in Modelica: choose another (--name).")
     taken, missing = divided(model, states=True), unwritten(model, "modelica")
-    states, written = taken.states, taken.parameters
+    states = taken.states
     needed = f"friction + {_sum(_products(taken.rest) + _bristles(states))}"
     actual = f"f + {_sum(_products(taken.faulty))}" if taken.faulty else needed
     text = (
         f'block {name} "Force of an axis, identified by jaxfric"\n'
         + "".join(f"  // Left out: {' '.join(text.split())}.\n" for text in missing)
-        + "".join(_parameter(*row) for row in constants(model) if row[0] in written)
+        + "".join(_parameter(*row) for row in constants(model, taken))
         + "".join(_parameter(*row) for row in levels(model))
         + _signals(model, ", f" * bool(taken.faulty) + ", r" * (taken.borne is not None))
         + "".join(f'  Real {_state(part)} "deflection of the bristle";\n' for part in states)
@@ -56,7 +56,7 @@ def export(model: Model, name: str = "axis") -> Exported:
         "The break-away levels are parameters for a model of sticking: the force that a motion "
         "needs does not depend on them.",
     ) * bool(levels(model))
-    return Exported(text, ForceError(0.0, 0.0, 0.0, dict(model.units)["force"]), missing, remarks)
+    return Exported(text, exact(model), missing, remarks)
 
 
 def _unit(unit: str) -> str:

@@ -1,7 +1,9 @@
 """A model taken apart: its summands with their parameters, and their force as text."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import groupby
+from textwrap import indent
 from typing import NamedTuple
 
 import numpy as np
@@ -211,6 +213,21 @@ def _sides(syntax, sided: Sequence[tuple[AbstractTerm, str]], affine, nonlinear)
     return tuple(found)
 
 
+def stated(products: Sequence[Line], add: Callable[[Line], str], opening: str, closing: str) -> str:
+    """The statements of products, those of one side inside a condition, by what a language has.
+
+    `add` writes the statement of one, `opening` has a place for the sign of comparison.
+    """
+    text = ""
+    for side, group in groupby(products, lambda line: line.side):
+        rows = "".join(map(add, group))
+        if side:
+            rows = indent(rows, "    ")
+            rows = opening.format(">" if side == "+" else "<") + rows + closing
+        text += rows
+    return text
+
+
 def divisors(model: Model) -> list[str]:
     """The parameters by which the force divides and that are zero."""
     found = []
@@ -228,13 +245,14 @@ def divisors(model: Model) -> list[str]:
     return found
 
 
-def constants(model: Model) -> list[tuple[str, float, str]]:
-    """Name, value and unit of every parameter, in order."""
+def constants(model: Model, taken: Divided) -> list[tuple[str, float, str]]:
+    """Name, value and unit of every parameter that a text holds, in order."""
     dimensions = {p.name: p.dimension for p in (*model.term.affine, *model.term.nonlinear)}
     units = dict(model.units)
     return [
         (name, float(value), spell(dimensions[name], units))
         for name, value in model.parameters.items()
+        if name in taken.parameters
     ]
 
 
@@ -248,6 +266,12 @@ def levels(model: Model) -> list[tuple[str, float, str]]:
         for sign, value in zip("-+", pair, strict=True)
         if np.isfinite(value)
     ]
+
+
+def without_levels(model: Model) -> list[str]:
+    """That a text has no break-away levels, where the model has."""
+    held = [f"{name} {value:.4g} {unit}" for name, value, unit in levels(model)]
+    return [f"Not written: the break-away levels, {', '.join(held)}."] * bool(held)
 
 
 def left_out(model: Model, part: Part) -> str:

@@ -6,11 +6,10 @@ block gives the break-away force in that direction, while the axis itself still 
 
 import re
 from collections.abc import Sequence
-from itertools import groupby
 
 from ..models import Model
-from .outcome import Exported, ForceError
-from .parts import Divided, Line, Part, constants, divided, levels, lines, unwritten
+from .outcome import Exported, exact
+from .parts import Divided, Line, Part, constants, divided, lines, stated, unwritten, without_levels
 from .syntax import Syntax, identifier, literal
 
 _KEYWORDS = set(
@@ -63,10 +62,7 @@ def export(model: Model, name: str = "axis") -> Exported:
         "At commanded standstill the friction is zero; from the first commanded velocity on it is "
         "the break-away force in that direction. Feed it the commanded motion, not the measured."
     )
-    unit = dict(model.units)["force"]
-    held = [f"{name} {value:.4g} {unit}" for name, value, unit in levels(model)]
-    remarks = (remark, *[f"Not written: the break-away levels, {', '.join(held)}."] * bool(held))
-    return Exported(text, ForceError(0.0, 0.0, 0.0, unit), missing, remarks)
+    return Exported(text, exact(model), missing, (remark, *without_levels(model)))
 
 
 def _reaction(syntax: Syntax, borne: Sequence[Part] | None) -> list[str]:
@@ -155,28 +151,20 @@ END_VAR"""
 def _constants(model: Model, taken: Divided) -> str:
     rows = [
         f"    {_name(name)} : LREAL := {_real(literal(value))}; (* {name}, {_comment(unit)} *)\n"
-        for name, value, unit in constants(model)
-        if name in taken.parameters
+        for name, value, unit in constants(model, taken)
     ]
     return "VAR CONSTANT\n" + "".join(rows) + "END_VAR"
 
 
 def _body(syntax: Syntax, some: Sequence[Part], result: str) -> str:
+    def added(line: Line) -> str:
+        return f"{result} := {result} + {_product(line)};\n"
+
     return "".join(
-        f"(* {_comment(part.name)} *)\n{_statements(lines(syntax, part), result)}" for part in some
+        f"(* {_comment(part.name)} *)\n"
+        + stated(lines(syntax, part), added, "IF v {} 0.0 THEN\n", "END_IF;\n")
+        for part in some
     )
-
-
-def _statements(products: tuple[Line, ...], result: str) -> str:
-    text = ""
-    for side, group in groupby(products, lambda line: line.side):
-        rows = [f"{result} := {result} + {_product(line)};\n" for line in group]
-        if side:
-            inner = "".join(f"    {row}" for row in rows)
-            text += f"IF v {'>' if side == '+' else '<'} 0.0 THEN\n{inner}END_IF;\n"
-        else:
-            text += "".join(rows)
-    return text
 
 
 def _product(line: Line) -> str:

@@ -1,13 +1,12 @@
 """CSV: friction over velocity, and every further term over its coordinate."""
 
-import csv
 from collections.abc import Mapping
-from io import StringIO
 
 import jax.numpy as jnp
 import numpy as np
 
 from ..data.recording import Recording
+from ..data.writing import csv_text
 from ..models import Model
 from ..units import VELOCITY, spell
 from . import cost
@@ -49,7 +48,7 @@ def export(
     odd = [part.name for part in further if part.term.sided]
     if odd:
         remark.append(f"{', '.join(odd)}: for positive velocity; negative velocity turns the sign.")
-    return Exported(_csv(columns), force_error, missing, tuple(remark), known["velocity"])
+    return Exported(csv_text(columns), force_error, missing, tuple(remark), known["velocity"])
 
 
 def _stick(model: Model, points: int) -> dict[str, np.ndarray]:
@@ -115,11 +114,3 @@ def _beside(
         f"{part.name} {' '.join(part.affine[:1])}" if part.affine[0][-1].isdigit() else part.name
     )
     return {f"{coordinate} [{unit}]": at, f"{label} [{units['force']}]": force}
-
-
-def _csv(columns: Mapping[str, np.ndarray]) -> str:
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*(array.tolist() for array in columns.values()), strict=True))
-    return text.getvalue()
