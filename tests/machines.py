@@ -9,6 +9,10 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxfric as jf
+from jaxfric import signals
+from jaxfric.identification.projections import WeakForm
+from jaxfric.models import weighed
+from jaxfric.simulation.prediction import at_once, later, with_channels
 
 PERIOD = 4.0
 
@@ -130,3 +134,28 @@ def _in_other_units(rng, count, machines):
         velocity=None if log.velocity is None else log.velocity * (x / t)[:, None],
     )
     return Fleet(scaled, {k: v * factors[k.rstrip("+-")] for k, v in truth.items()})
+
+
+def relative_error(
+    model: jf.Model, recording: jf.Recording, half_width: int | None = None
+) -> jax.Array:
+    """norm(u − û)/norm(u) of a model on a recording, both passed through the same kernel.
+
+    The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.
+    `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
+    """
+    model, delay = at_once(model)
+    if model.force_limit is not None:
+        recording = dataclasses.replace(recording, force=model.arriving(recording.force))
+    prepared = with_channels(model, signals.prepare(recording))
+    if delay is not None:
+        prepared = dataclasses.replace(prepared, force=later(prepared, prepared.force, -delay))
+    width = half_width or signals.kernel_half_width(prepared)
+    return _relative_error(model, prepared, width)
+
+
+@eqx.filter_jit
+def _relative_error(model, recording, width):
+    rows = WeakForm(width).rows(recording, signals.scales(recording))
+    left = rows.target - weighed(rows.columns(model.term, recording), model.alpha)
+    return rows.relative(left - rows.offset(model.term, recording))

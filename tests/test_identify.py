@@ -13,7 +13,8 @@ from hypothesis import given, settings, strategies as st
 import jaxfric as jf
 from jaxfric.identification import identifying
 from jaxfric.identification.identified import result_names
-from jaxfric.simulation.errors import force_error, relative_error
+from jaxfric.simulation.errors import force_error
+from tests.machines import relative_error
 
 RATE = 1000.0
 

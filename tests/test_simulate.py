@@ -15,12 +15,12 @@ from hypothesis import given, settings, strategies as st
 from jaxfric import models, terms
 from jaxfric.data.recording import Recording
 from jaxfric.simulation.control import PD, PID, Cascade, Encoder
-from jaxfric.simulation.errors import relative_error
 from jaxfric.simulation.prediction import predict
 from jaxfric.simulation.simulating import simulate
 from jaxfric.simulation.substeps import default_substeps
 from jaxfric.terms import AbstractLaw, Parameter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
+from tests.machines import relative_error
 
 TRUTH = {
     "inertia": 5.0, "coulomb+": 20.0, "viscous+": 60.0, "stribeck_force+": 8.0,

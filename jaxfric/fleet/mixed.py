@@ -27,8 +27,6 @@ LEAST = 0.25
 # Names of files in a sentence.
 SHOWN = 3
 
-Groups = tuple[list[File], list[File]]
-
 
 def mixed_units(files: Sequence[File], rows: Mapping[str, Row], model: str) -> tuple[str, ...]:
     """Sentences on recordings that state different units, or whose parameters look like it."""

@@ -1,22 +1,19 @@
 """How far a model's force is from the recorded one, and over which samples that is told."""
 
-import dataclasses
 import math
 from collections.abc import Collection, Iterator, Sequence
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Bool, Float, Int
 
 from .. import checks, signals
 from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
-from ..identification.projections import WeakForm
-from ..models import Model, require as require_model, weighed
-from .prediction import Prepared, at_once, forces, later, samples_of, with_channels
+from ..models import Model, require as require_model
+from .prediction import Prepared, at_once, forces, later, samples_of
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
@@ -206,28 +203,3 @@ def power(values: Float[np.ndarray, " N"], chosen: Bool[np.ndarray, " N"]) -> fl
     pieces = (slice(start, start + MOST) for start in range(0, len(values), MOST))
     parts = (values[piece][chosen[piece]] for piece in pieces)
     return float(sum(part @ part for part in parts))
-
-
-def relative_error(
-    model: Model, recording: Recording, half_width: int | None = None
-) -> Float[Array, ""]:
-    """norm(u − û)/norm(u) of a model on a recording, both passed through the same kernel.
-
-    The measure of the EMPS benchmark (Janot, Gautier & Brunot 2019), over everything but rest.
-    `half_width` of the kernel in samples; by default that of [`signals.kernel_half_width`][].
-    """
-    model, delay = at_once(model)
-    if model.force_limit is not None:
-        recording = dataclasses.replace(recording, force=model.arriving(recording.force))
-    prepared = with_channels(model, signals.prepare(recording))
-    if delay is not None:
-        prepared = dataclasses.replace(prepared, force=later(prepared, prepared.force, -delay))
-    width = half_width or signals.kernel_half_width(prepared)
-    return _relative_error(model, prepared, width)
-
-
-@eqx.filter_jit
-def _relative_error(model, recording, width):
-    rows = WeakForm(width).rows(recording, signals.scales(recording))
-    left = rows.target - weighed(rows.columns(model.term, recording), model.alpha)
-    return rows.relative(left - rows.offset(model.term, recording))

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import actuation, rigid, weights
 from .actuation import Actuator
-from .inverse import Along, Motion, along, weighed, with_friction
+from .inverse import Along, Motion, along, with_friction
 from .known import Attribute
 from .loading import is_hinge
 
@@ -137,12 +137,10 @@ def _of_bodies(mujoco: Any, model: Any, joint: int):
         if model.body_mass[body] <= 0 or joint not in _moved_by(model, body):
             continue
         label = weights.label(model, body)
-        own = weighed(mujoco, model, body)
-        values = {"mass": own[0], **_lettered("centre", own[1]), **_lettered("inertia", own[2])}
+        own = weights.weight_of(mujoco, model, body)
+        values = own.values()
         for what, slope in rigid.slopes(*own).items():
-            unit = {"mass": "kg", "centre": "m"}.get(what.partition("_")[0], "kg·m²")
-            words = what.replace("centre_", "centre of mass ").replace("_", " ")
-            attribute = Attribute(f"body {label}", words, float(values[what]), unit)
+            attribute = weights.worded(label, what, float(values[what]))
             maker = _body(slope, body, joint, model.opt.gravity)
             found[f"body/{label}/{what}"] = (attribute, maker)
     return found
@@ -151,10 +149,6 @@ def _of_bodies(mujoco: Any, model: Any, joint: int):
 def moved(model: Any, joint: int) -> set[str]:
     """The names of the bodies that a joint moves."""
     return {weights.label(model, b) for b in range(1, model.nbody) if joint in _moved_by(model, b)}
-
-
-def _lettered(what: str, values) -> dict[str, float]:
-    return {f"{what}_{letter}": float(v) for letter, v in zip("xyz", values, strict=True)}
 
 
 def _body(slope, body: int, joint: int, gravity) -> Callable[[Along], Parts]:

@@ -1,5 +1,6 @@
 """MuJoCo's inverse dynamics along a motion, with the momentum apart."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,11 +34,8 @@ class Along(NamedTuple):
 def along(mujoco: Any, model: Any, motion: Motion) -> Along:
     """The model's inverse dynamics along a motion."""
     position, velocity, acceleration = motion
-    data = mujoco.MjData(model)
     force, inertial, bias, friction = np.empty((4, *position.shape))
-    for i in range(len(position)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = position[i], velocity[i], acceleration[i]
-        mujoco.mj_inverse(model, data)
+    for i, data in enumerate(_moments(mujoco, model, motion)):
         force[i], bias[i], friction[i] = data.qfrc_inverse, data.qfrc_bias, -data.qfrc_constraint
         mujoco.mj_mulM(model, data, inertial[i], acceleration[i])
     frames = rigid.frames(mujoco, model, position, velocity)
@@ -50,12 +48,19 @@ def along(mujoco: Any, model: Any, motion: Motion) -> Along:
 
 def forces(mujoco: Any, model: Any, motion: Motion) -> np.ndarray:
     """The inverse dynamics alone, `(N, dof)`."""
-    data, found = mujoco.MjData(model), np.empty(motion.position.shape)
-    for i in range(len(found)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = (part[i] for part in motion)
-        mujoco.mj_inverse(model, data)
+    found = np.empty(motion.position.shape)
+    for i, data in enumerate(_moments(mujoco, model, motion)):
         found[i] = data.qfrc_inverse
     return found
+
+
+def _moments(mujoco: Any, model: Any, motion: Motion) -> Iterator[Any]:
+    """MuJoCo's data after its inverse dynamics, moment by moment."""
+    data = mujoco.MjData(model)
+    for position, velocity, acceleration in zip(*motion, strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = position, velocity, acceleration
+        mujoco.mj_inverse(model, data)
+        yield data
 
 
 def sum_of_bodies(mujoco: Any, model: Any, frames) -> tuple[np.ndarray, np.ndarray]:
@@ -83,10 +88,6 @@ def with_friction(mujoco: Any, model: Any, motion: Motion, joint: int, step: flo
     """The friction of a joint with `frictionloss` larger by a step, `(N,)`."""
     kept = float(model.dof_frictionloss[joint])
     model.dof_frictionloss[joint] = kept + step
-    data, found = mujoco.MjData(model), np.empty(len(motion.position))
-    for i in range(len(found)):
-        data.qpos[:], data.qvel[:], data.qacc[:] = (part[i] for part in motion)
-        mujoco.mj_inverse(model, data)
-        found[i] = -data.qfrc_constraint[joint]
+    found = np.array([-data.qfrc_constraint[joint] for data in _moments(mujoco, model, motion)])
     model.dof_frictionloss[joint] = kept
     return found

@@ -120,7 +120,13 @@ def linear(mujoco: Any, model: Any, joint: int, seen: Along) -> list[tuple[np.nd
 
 def attribute(weight: Weight, body: str, what: str) -> Attribute:
     """A value of a body in words."""
-    unit = {"mass": "kg", "centre": "m"}.get(what.partition("_")[0], "kg·m²")
     words = {MASS: "mass with its inertia in proportion", MASS_ALONE: "mass"}
-    said = words.get(what, what.replace("centre_", "centre of mass ").replace("_", " "))
-    return Attribute(f"body {body}", said, weight.values()[what], unit)
+    own = worded(body, what, weight.values()[what])
+    return own._replace(what=words.get(what, own.what))
+
+
+def worded(body: str, what: str, value: float) -> Attribute:
+    """A value of a body by its name in a file, in words."""
+    unit = {"mass": "kg", "centre": "m"}.get(what.partition("_")[0], "kg·m²")
+    words = what.replace("centre_", "centre of mass ").replace("_", " ")
+    return Attribute(f"body {body}", words, value, unit)
