@@ -3,7 +3,7 @@
 import json
 import os
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 # Control, format (which may turn the direction of writing), half of a pair, separators of lines.
 _UNSEEN = ("Cc", "Cf", "Cs", "Zl", "Zp")
@@ -41,6 +41,11 @@ def listed(names: Iterable[str], most: int = MOST) -> str:
     names = list(names)
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return (", ".join(map(short, names[:most])) or "none") + more
+
+
+def listed_and(names: Sequence[str]) -> str:
+    """Names in a row: "a, b and c"."""
+    return " and ".join([*([", ".join(names[:-1])] if len(names) > 1 else []), *names[-1:]])
 
 
 def short(text: str) -> str:

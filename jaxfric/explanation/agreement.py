@@ -5,15 +5,17 @@ from typing import NamedTuple
 
 import jax
 
+from ..data.printable import listed_and
 from ..data.recording import Recording
 from ..models import Model
 from ..simulators import Attribute, Mujoco
+from ..simulators.columns import GAIN
 from ..simulators.weights import MASS, attribute, weights
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled
 from .acceptance import LINEARITY
-from .attributes import CONSTANT, GAIN, listed
+from .attributes import CONSTANT, listed
 from .bodies import Bodies, State
 from .explained import Explanation
 from .fewest_numbers import answer
@@ -126,11 +128,6 @@ def _held_out_share(found: Explanation, first: Explanation) -> float | None:
 def _confirmed(found: Explanation, first: Explanation) -> bool | None:
     share = _held_out_share(found, first)
     return None if share is None else share > 0
-
-
-def listed_and(names: Sequence[str]) -> str:
-    """Names in a row: "a, b and c"."""
-    return " and ".join([*([", ".join(names[:-1])] if len(names) > 1 else []), names[-1]])
 
 
 def _text(

@@ -7,14 +7,15 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..simulators import Attribute
+from ..simulators.columns import GAIN
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation
 from .finding import Finding, Moved
 from .sentences import indistinct, quantity
 
-# Corrections that are no attribute by themselves.
-GAIN, CONSTANT = "gain", "offset"
+# A correction that is no attribute by itself, as the gain of all of the force.
+CONSTANT = "offset"
 # More than these no one reads.
 MOST = 4
 POSITIVE = {"armature", "damping", "frictionloss", "inertia", "mass", "stiffness"}

@@ -57,29 +57,34 @@ def nil(estimate: Estimate) -> bool:
 
 def per_pole_pair(period: Estimate, pairs: int) -> str:
     """How often a period of an angle goes into a pole pair: " That is 6 times per pole pair."."""
-    turn = TURNS.get(period.unit)
-    value, error = float(period.value), float(period.half_width())
-    if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
-        return ""
-    count, half = turn / value / pairs, turn * error / value**2 / pairs
-    whole = round(count)
-    if whole and abs(count - whole) <= max(half, 0.01 * whole):
-        return f" That is {'once' if whole == 1 else f'{whole} times'} per pole pair."
-    return f" That is {count:.3g} times per pole pair, so not of the electrical period."
+    count, times = _count(period, pairs)
+    if times:
+        return f" That is {times} per pole pair."
+    text = f" That is {count:.3g} times per pole pair, so not of the electrical period."
+    return text if count else ""
 
 
 def turns(period: Estimate) -> str:
     """How often a period of an angle goes into a revolution: " (5 times per revolution)"."""
+    count, times = _count(period)
+    if times:
+        return f" ({times} per revolution)"
+    return f" ({count:.3g} per revolution)" if count else ""
+
+
+def _count(period: Estimate, parts: int = 1) -> tuple[float, str]:
+    """How often a period of an angle goes into a part of a revolution, 0 where it is none of an
+    angle, and that in words where it is a whole number, as a wave of the motor or its gear does.
+    """
     turn = TURNS.get(period.unit)
     value, error = float(period.value), float(period.half_width())
     if turn is None or not value > 0 or not math.isfinite(error) or value > 1.5 * turn:
-        return ""
-    count, half = turn / value, turn * error / value**2
+        return 0.0, ""
+    count, half = turn / value / parts, turn * error / value**2 / parts
     whole = round(count)
-    # A wave of the motor or its gear goes a whole number of times into a revolution.
-    if whole and abs(count - whole) <= max(half, 0.01 * whole):
-        return f" ({'once' if whole == 1 else f'{whole} times'} per revolution)"
-    return f" ({count:.3g} per revolution)"
+    if not whole or abs(count - whole) > max(half, 0.01 * whole):
+        return count, ""
+    return count, "once" if whole == 1 else f"{whole} times"
 
 
 def rise(before: float, after: float) -> str:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 
 from ..identification.uncertainty import Estimate
+from ..simulators.columns import GAIN
 from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
@@ -64,10 +65,6 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
     text = f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force"
     return f"{text}{indistinct(rivals)}."
-
-
-# How much of a simulator's force is recorded beyond all of it.
-GAIN = "gain"
 
 
 def _times(factor: Estimate) -> str:

@@ -43,18 +43,14 @@ def summarise(
     the baseline as it was given, and `wrong`, which of its values are; `figures`: the force errors
     of models; `remarks`: what was said about the recording before.
     """
-    units, problem, selection = recording.unit_names, better.findings.problem, _selection(better)
+    units, problem = recording.unit_names, better.findings.problem
+    selection = better.findings.selection
     before, after = structure.before_and_after(better, wrong, seed)
-    findings, alone = reported(better.findings, better.first)
+    effects, alone = reported(better.findings, better.first)
     refuted = not_confirmed(better)
-    shares = _by_effect(findings)
     values = _values(better, wrong, units)
-    pictures = partial_residuals(better)
-    if wrong is not None:
-        findings = [wrong_values(values, wrong, known, better), *findings]
-        pictures = [moved_curve(better, wrong), *pictures]
-    pairs = sorted(zip(findings, pictures, strict=True), key=lambda pair: -pair[0].share)
-    findings = [finding for finding, _ in pairs]
+    drawn = _drawn(effects, better, wrong, known, values)
+    findings = [finding for finding, _ in drawn]
     models = (
         better.findings.at_base(better.first).model(better.first),
         better.findings.model(selection.last),
@@ -68,9 +64,8 @@ def summarise(
     new, later = (
         [s for s in some if s.coordinate not in known.structured] for some in (before, after)
     )
-    missing = rough(filtered, shares) or beside_rows(errors) or halved(refuted)
-    if not findings and filtered["force_error"]["after"] > LINEARITY:
-        missing |= halvable(selection.remaining, selection.last)
+    missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
+    missing |= not findings and _halvable(selection, filtered)
     # Values that are known in both recordings and differ: no one model holds for both.
     missing |= bool(apart and errors.get("holdout_values"))
     much = missing and not known.rough
@@ -88,14 +83,27 @@ def summarise(
         baseline_name=known.name,
         baseline_parameters=values,
         recording=facts(recording),
-        curves=curves(before[:6], better, models) | {"findings": [each for _, each in pairs]},
+        curves=curves(before[:6], better, models) | {"findings": [each for _, each in drawn]},
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if problem.held is None else holdout_model(better.findings),
     )
 
 
-def _selection(better: Improved) -> Selection:
-    return better.findings.selection
+def _halvable(selection: Selection, filtered: Mapping[str, Any]) -> bool:
+    """Whether a law that was not accepted halves what is left, of more than a sensor resolves."""
+    left = filtered["force_error"]["after"]
+    return left > LINEARITY and halvable(selection.remaining, selection.last)
+
+
+def _drawn(
+    effects: Sequence[Finding], better: Improved, wrong: Mismatch | None, known: Baseline, values
+) -> list[tuple[Finding, dict[str, Any]]]:
+    """All findings, wrong values of the baseline too, each with its picture; the largest first."""
+    drawn = list(zip(effects, partial_residuals(better), strict=True))
+    if wrong is not None:
+        moved = wrong_values(values, wrong, known, better), moved_curve(better, wrong)
+        drawn = [moved, *drawn]
+    return sorted(drawn, key=lambda pair: -pair[0].share)
 
 
 def _by_effect(findings: Sequence[Finding]) -> dict[str, float]:

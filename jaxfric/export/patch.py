@@ -9,10 +9,11 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..explanation import Explanation
-from ..explanation.attributes import CONSTANT, GAIN
+from ..explanation.attributes import CONSTANT
 from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..simulators import Mujoco, actuation
+from ..simulators.columns import GAIN
 from ..simulators.loading import library
 from ..simulators.patching import Patched, folder_of, patched
 from ..simulators.weights import MASS, MASS_ALONE
@@ -105,17 +106,8 @@ def patch(
     left += [f"{_label(key)}: {why}" for key, why in apart.items()]
     values = {key: pair for key, pair in values.items() if key not in apart}
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
-    beside = {joint: _beside(told) for joint, told in found.items()}
-    models: dict[str, Model] = {}
-    for joint, model in beside.items():
-        able, others = ([], []) if model is None else callback.told(model)
-        left += [
-            f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
-        ]
-        good = _confirmed(source, done.text, joint, found[joint], recordings[joint], model, able)
-        left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]
-        if good:
-            models[joint] = callback.only(model, good)
+    models, unable = _forces(source, done.text, found, recordings)
+    left += unable
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
@@ -131,6 +123,25 @@ def patch(
     misses = tuple(miss(joint, told, errors[joint]) for joint, told in found.items())
     patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+
+
+def _forces(
+    source, text: str, found: dict[str, Explanation], recordings
+) -> tuple[dict[str, Model], list[str]]:
+    """The forces beside the file by joint, and why others are not written, a line each."""
+    models: dict[str, Model] = {}
+    left: list[str] = []
+    for joint, told in found.items():
+        model = _beside(told)
+        able, others = ([], []) if model is None else callback.told(model)
+        left += [
+            f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
+        ]
+        good = _confirmed(source, text, joint, told, recordings[joint], model, able)
+        left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]
+        if good:
+            models[joint] = callback.only(model, good)
+    return models, left
 
 
 # Why a force is not written.

@@ -4,10 +4,10 @@ import dataclasses
 
 from ..data.recording import Recording
 from ..explanation import Explanation
-from ..explanation.attributes import GAIN
 from ..explanation.errors import through_kernel
 from ..models import Model
 from ..simulators import Mujoco, actuation
+from ..simulators.columns import GAIN
 from ..simulators.patching import folder_of
 from ..terms import KnownForce
 from ..terms.base import Sum, summands

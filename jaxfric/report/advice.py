@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ..data.printable import listed_and
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 
@@ -72,10 +73,7 @@ def _errors(fit: Mapping[str, Any]) -> str:
 def _listed(names: list[str]) -> str:
     """Names, the same one counted."""
     counted = [f"{n} ({names.count(n)} ×)" if names.count(n) > 1 else n for n in names]
-    different = list(dict.fromkeys(counted))
-    if len(different) < 2:
-        return "".join(different) or "something"
-    return f"{', '.join(different[:-1])} and {different[-1]}"
+    return listed_and(list(dict.fromkeys(counted))) or "something"
 
 
 def steps(document: Mapping[str, Any]) -> list[str]:

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..looks.drawing import label
+
 # Digits of what is drawn: a ten-thousandth of the range is less than a dot.
 DIGITS = 5
 Curves = Mapping[str, Any]
@@ -19,8 +21,8 @@ def chart(
     y_unit, y_scale = _prefixed(y[1], columns)
     return {
         "title": title,
-        "x": {"label": _label(x[0], x_unit), "unit": x_unit},
-        "y": {"label": _label(y[0], y_unit), "unit": y_unit},
+        "x": {"label": label(x[0], x_unit), "unit": x_unit},
+        "y": {"label": label(y[0], y_unit), "unit": y_unit},
         "height": height,
         "series": drawn,
         "data": [_short(at, x_scale), *(_short(column, y_scale) for column in columns)],
@@ -191,10 +193,6 @@ def _models(curves: Curves) -> list[Any]:
         line("before", "baseline", curves.get("before"), 1.0),
         line("after", "improved model", curves.get("after"), 1.0),
     ]
-
-
-def _label(quantity: str, unit: str) -> str:
-    return quantity.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
 def _moved(value, error, side: float):

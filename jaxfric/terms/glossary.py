@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..data.provenance import versions
+from ..looks.text import WIDTH
 from ..units import spell
 from .base import AbstractTerm
+from .effect import ANY
 from .effects import EFFECTS, Effect, effect
-from .sample import Parameter, Scales
+from .sample import Parameter
 
 SCHEMA = "jaxfric.effects/1"
-# A recording of ones: the shapes of an effect, their names and dimensions do not depend on it.
-_ANY = Scales(*[1.0] * len(Scales._fields))
-_WIDTH = 98
 
 
 def document(names: Sequence[str] = ()) -> dict[str, Any]:
@@ -39,7 +38,7 @@ def _entry(each: Effect) -> dict[str, Any]:
         "confusable_with": list(each.confusable_with),
         "separate_by": each.separate_by,
         "first_order": each.first_order,
-        "terms": [_shape(term) for term in each.shapes(_ANY)],
+        "terms": [_shape(term) for term in each.shapes(ANY)],
     }
 
 
@@ -68,7 +67,7 @@ def _bounds(parameter: Parameter) -> str:
     said = inspect.getdoc(parameter.bounds)
     if said:
         return _lowered(said.splitlines()[0].rstrip("."))
-    low, high = parameter.bounds(_ANY)
+    low, high = parameter.bounds(ANY)
     return f"from {float(low):g} to {float(high):g}"
 
 
@@ -110,7 +109,7 @@ def _labelled(label: str, text: str) -> list[str]:
 
 
 def _wrapped(text: str, first: str, later: str) -> list[str]:
-    return textwrap.wrap(text, _WIDTH, initial_indent=first, subsequent_indent=later)
+    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=later)
 
 
 def detail(name: str) -> str:

@@ -59,16 +59,8 @@ def draw(
     time = np.arange(plan.samples) / plan.sample_rate
     x, v = reference(plan, seed, 0)
     coulomb, top = log_uniform(rng, 1e-5, 3e3), float(np.quantile(np.abs(v), 0.98))
-    shape = _shape(rng, kinds)
-    friction = draw_friction(rng, coulomb, top, shape)
-    if any(kind.tied for kind in kinds):
-        friction = tied(friction)
-    if any(kind.bump for kind in kinds):
-        friction = _pronounced(friction, coulomb, top)
+    baseline, friction = _friction(rng, kinds, coulomb, top)
     omega = draw_band(rng, plan, slowest=any(kind.slow for kind in kinds))
-    baseline = shape or "coulomb-viscous"
-    if any(kind.tied for kind in kinds):
-        baseline = f"symmetric-{baseline}"
 
     def driven(rng, omega) -> Machine:
         # Coulomb friction may bend the loop by a twentieth of the stroke.
@@ -92,6 +84,17 @@ def draw(
         # Nobody runs a loop that bursts: whoever tunes it lowers its gains.
         omega /= 2
     raise ValueError(f"The loop of machine {seed} with {', '.join(effects)} bursts.")
+
+
+def _friction(rng, kinds, coulomb: float, top: float) -> tuple[str, dict[str, float]]:
+    """The name of the baseline that fits the healthy machine, and its friction."""
+    shape = _shape(rng, kinds)
+    friction, baseline = draw_friction(rng, coulomb, top, shape), shape or "coulomb-viscous"
+    if any(kind.tied for kind in kinds):
+        friction, baseline = tied(friction), f"symmetric-{baseline}"
+    if any(kind.bump for kind in kinds):
+        friction = _pronounced(friction, coulomb, top)
+    return baseline, friction
 
 
 def _with(machine: Machine, effects, n, size, asked) -> Machine:
