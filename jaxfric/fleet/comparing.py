@@ -7,6 +7,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from ..terms.friction import STRIBECK_VELOCITY
 from .files import File
 from .journal import Row
 
@@ -131,7 +132,8 @@ def _outliers(gathered: Iterable[tuple[str, _Values]]):
     for group, v in gathered:
         values, errors = v.values, v.errors
         # Of these the bounds are a ratio, and so is their scatter.
-        ratio = v.name.startswith(("stribeck_velocity", FORCE_ERROR)) and bool(np.all(values > 0))
+        by_ratio = STRIBECK_VELOCITY.name, FORCE_ERROR
+        ratio = v.name.startswith(by_ratio) and bool(np.all(values > 0))
         if ratio:
             values, errors = np.log(values), errors / values
         median = float(np.median(values))

@@ -51,7 +51,7 @@ def _stribeck_bounds(scales):
 
 
 _STRIBECK_FORCE = (Parameter("stribeck_force", FORCE),)
-_STRIBECK_VELOCITY = Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds)
+STRIBECK_VELOCITY = Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds)
 
 
 class AbstractBump(AbstractLaw):
@@ -114,7 +114,7 @@ class Gaussian(AbstractExponentialBump):
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
+    nonlinear: ClassVar = (STRIBECK_VELOCITY,)
 
     def shape(self, speed):
         return jnp.exp(-((speed / self.stribeck_velocity) ** 2))
@@ -133,7 +133,7 @@ class Lorentzian(AbstractBump):
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
+    nonlinear: ClassVar = (STRIBECK_VELOCITY,)
 
     def shape(self, speed):
         return 1 / (1 + (speed / self.stribeck_velocity) ** 2)
@@ -152,7 +152,7 @@ class Exponential(AbstractExponentialBump):
     """
 
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
-    nonlinear: ClassVar = (_STRIBECK_VELOCITY,)
+    nonlinear: ClassVar = (STRIBECK_VELOCITY,)
 
     def shape(self, speed):
         return jnp.exp(-speed / self.stribeck_velocity)
@@ -174,7 +174,7 @@ class Generalised(AbstractExponentialBump):
     stribeck_velocity: Float[Array, ""] | float = UNKNOWN
     stribeck_exponent: Float[Array, ""] | float = UNKNOWN
     nonlinear: ClassVar = (
-        _STRIBECK_VELOCITY,
+        STRIBECK_VELOCITY,
         Parameter("stribeck_exponent", DIMENSIONLESS, lambda scales: (0.5, 2.0), logarithmic=False),
     )
 

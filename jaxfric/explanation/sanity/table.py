@@ -7,7 +7,7 @@ import numpy as np
 
 from ...identification.uncertainty import Estimate
 from ...simulators import Mujoco
-from ...terms.effects.end_stop import END_STOP
+from ...terms.effects.end_stop import END_STOP, place
 from ..quantities import quantity
 from . import limits
 from .contact import Contact
@@ -175,7 +175,6 @@ def _limit(part: Part, bound: Estimate | None) -> Check:
 def _blocked(contact: Contact) -> Check:
     """Where something that the simulator lacks blocks the axis."""
     side = "upper" if contact.upper else "lower"
-    name = "stop_position" if contact.upper else "lower_stop_position"
     text = (
         f"At {quantity(contact.place)}, the {side} end of the stroke, something blocks the axis: "
         f"it holds up to {contact.held:.3g} {contact.unit}, more than friction can. It is a limit "
@@ -184,15 +183,9 @@ def _blocked(contact: Contact) -> Check:
     )
     apart = "Look at the machine there: does it touch its own end, or something beside it?"
     return Check(
-        END_STOP.name,
-        text,
-        True,
-        False,
-        contact.place,
-        name,
-        separate_by=apart,
+        END_STOP.name, text, True, False, contact.place, place(contact.upper), separate_by=apart,
         share=contact.share,
-    )
+    )  # fmt: skip
 
 
 def _ends(part: Part) -> list[Check]:

@@ -63,6 +63,11 @@ class LowerEndStop(AbstractLaw):
         return (s.call("min", f"x - {place}", "0.0"),)
 
 
+def place(upper: bool) -> str:
+    """The name of the parameter that says where the stop of an end is."""
+    return (EndStop if upper else LowerEndStop).nonlinear[0].name
+
+
 # A stop is met at the end: what acts over more than this part of the stroke is something else.
 ABRUPT = 0.25
 # Over half of that, too, where at the end it is less than this part of the usual force.
@@ -71,12 +76,12 @@ FAINT = 0.25
 
 def soft(values: Mapping[str, float], extent: Extent) -> str | None:
     """The sentence for either end, and another one for what acts over too much of the stroke."""
-    lower = "lower_stop_position" in values
+    lower = place(upper=False) in values
     side = "lower_" if lower else ""
-    place, stiffness = (values.get(f"{side}stop_{name}") for name in ("position", "stiffness"))
-    if place is None or stiffness is None:
+    at, stiffness = (values.get(f"{side}stop_{name}") for name in ("position", "stiffness"))
+    if at is None or stiffness is None:
         return None
-    reach = abs((extent.low if lower else extent.high) - place)
+    reach = abs((extent.low if lower else extent.high) - at)
     part = reach * abs(stiffness) / extent.force
     most = ABRUPT if part > FAINT or math.isnan(part) else 0.5 * ABRUPT
     if not reach > most * extent.stroke:

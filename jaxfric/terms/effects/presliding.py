@@ -5,8 +5,9 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ...units import FORCE, POSITION, VELOCITY
+from ...units import FORCE, POSITION
 from ..effect import Effect
+from ..friction import STRIBECK_VELOCITY
 from ..presliding import AbstractBristle
 from ..sample import UNKNOWN, Parameter
 
@@ -38,11 +39,6 @@ class Dahl(AbstractBristle):
         return (deflection - jnp.sign(velocity))[:, None]
 
 
-def _stribeck_bounds(scales):
-    """As for the bump itself: from the slowest slip to half the top speed."""
-    return scales.slowest, 0.5 * scales.fastest
-
-
 class LuGre(AbstractBristle):
     """Presliding with a Stribeck curve: F = (F_p + F_b exp(−(v/v_s)²)) (z − sign v), z as in Dahl.
 
@@ -57,7 +53,7 @@ class LuGre(AbstractBristle):
         Parameter("presliding_force", FORCE),
         Parameter("presliding_stribeck_force", FORCE),
     )
-    nonlinear: ClassVar = (_DISTANCE, Parameter("stribeck_velocity", VELOCITY, _stribeck_bounds))
+    nonlinear: ClassVar = (_DISTANCE, STRIBECK_VELOCITY)
 
     def lagging(self, velocity, deflection) -> Float[Array, "N 2"]:
         lagging = deflection - jnp.sign(velocity)
