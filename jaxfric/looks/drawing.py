@@ -1,6 +1,7 @@
 """Pictures by matplotlib, from plain arrays, on axes that are given."""
 
 from collections.abc import Mapping, Sequence
+from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +27,13 @@ def figure(width: float, height: float):
     from matplotlib import pyplot
 
     return pyplot.figure(figsize=(width, height), layout="constrained")
+
+
+def saved(picture, format: str, dpi: int) -> bytes:
+    """A figure as the content of a file: `png`, `pdf` or `svg`."""
+    buffer = BytesIO()
+    picture.savefig(buffer, format=format, dpi=dpi)
+    return buffer.getvalue()
 
 
 def panels(ax, count: int, height: float = 1.9) -> np.ndarray:
@@ -76,9 +84,7 @@ def friction(axes, sides: Sequence[Side], units: Mapping[str, str], speed: str, 
         axes.plot(
             side.velocity, side.force, color=colour, lw=1.8, label=f"identified, {way}, 95 % band"
         )
-    axes.axhline(0, color="0.8", lw=0.8, zorder=0)
-    axes.axvline(0, color="0.8", lw=0.8, zorder=0)
-    axes.set_xlabel(f"velocity [{plain(speed)}]")
+    _over_velocity(axes, speed)
     axes.set_ylabel(f"friction force [{plain(units['force'])}]")
     axes.set_title(plain(f"Friction of {name}") if name else "Identified friction")
     if sides:
@@ -179,8 +185,7 @@ def in_time(axes, rest, time, measured, model, unit: str, clock: str = "time [s]
     axes.plot(time, measured, color="0.55", lw=1.8, label="measured")
     axes.plot(time, model, color=FORWARDS, lw=0.8, label="model in motion, inertia included")
     axes.set_ylabel(f"force [{plain(unit)}]")
-    _room(axes)
-    axes.legend(fontsize=8, ncols=2, loc="upper center")
+    _legend(axes, 2)
     axes.tick_params(labelbottom=False)
     rest.plot(time, measured - model, color="0.35", lw=0.7)
     rest.axhline(0, color="0.8", lw=0.8, zorder=0)
@@ -188,10 +193,18 @@ def in_time(axes, rest, time, measured, model, unit: str, clock: str = "time [s]
     rest.set_ylabel(f"difference [{plain(unit)}]")
 
 
-def _room(axes) -> None:
-    """Room for a legend above what is drawn."""
+def _over_velocity(axes, speed: str) -> None:
+    """Lines through rest and no force, and the name of the axis."""
+    axes.axhline(0, color="0.8", lw=0.8, zorder=0)
+    axes.axvline(0, color="0.8", lw=0.8, zorder=0)
+    axes.set_xlabel(f"velocity [{plain(speed)}]")
+
+
+def _legend(axes, columns: int) -> None:
+    """A legend above what is drawn, with room for it."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.2 * (high - low))
+    axes.legend(fontsize=8, ncols=columns, loc="upper center")
 
 
 def residual(axes, entry: Mapping[str, Any], force: str) -> None:
@@ -210,8 +223,7 @@ def residual(axes, entry: Mapping[str, Any], force: str) -> None:
     axes.set_xlabel(plain(label(entry["coordinate"], entry.get("unit"))))
     axes.set_ylabel(f"mean residual [{plain(force)}]")
     axes.grid(color="0.93")
-    _room(axes)
-    axes.legend(fontsize=8, ncols=2, loc="upper center")
+    _legend(axes, 2)
 
 
 def compared(axes, curves: Mapping[str, Any], force: str, left: bool = False) -> None:
@@ -227,8 +239,7 @@ def compared(axes, curves: Mapping[str, Any], force: str, left: bool = False) ->
     axes.set_xlabel("time [s]")
     axes.set_ylabel(f"{'residual' if left else 'force'} [{plain(force)}]")
     axes.grid(color="0.93")
-    _room(axes)
-    axes.legend(fontsize=8, ncols=3, loc="upper center")
+    _legend(axes, 3)
 
 
 def curves(axes, friction: Mapping[str, Any], force: str, speed: str) -> None:
@@ -241,9 +252,7 @@ def curves(axes, friction: Mapping[str, Any], force: str, speed: str) -> None:
                 at = side * velocity > 0
                 name = key if side > 0 else None
                 axes.plot(velocity[at], values[at], color=colour, lw=1.3, label=name)
-    axes.axhline(0, color="0.8", lw=0.8, zorder=0)
-    axes.axvline(0, color="0.8", lw=0.8, zorder=0)
-    axes.set_xlabel(f"velocity [{plain(speed)}]")
+    _over_velocity(axes, speed)
     axes.locator_params(axis="x", nbins=6)
     what = "correction" if friction.get("corrects") else "friction force"
     axes.set_ylabel(f"{what} [{plain(force)}]")

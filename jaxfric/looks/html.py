@@ -4,7 +4,6 @@ from base64 import b64encode
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from html import escape
-from io import BytesIO
 from typing import Any
 
 from . import drawing
@@ -73,10 +72,8 @@ def png(draw: Draw | None) -> bytes | None:
     """What draws on a figure as a PNG; `None` where it cannot, or without matplotlib."""
     if draw is None:
         return None
-    buffer = BytesIO()
     with suppress(Exception):
         figure = drawing.library()(layout="constrained")
         draw(figure)
-        figure.savefig(buffer, format="png", dpi=90)
-        return buffer.getvalue()
+        return drawing.saved(figure, "png", 90)
     return None

@@ -1,7 +1,6 @@
 """The picture of a fleet: every recording's parameters with what is usual, outliers and drifts."""
 
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from ..fleet.comparing import FORCE_ERROR, LEVEL, Drift, Summary
 from ..fleet.files import File
 from ..fleet.journal import Row
 from ..identification.uncertainty import COSINES, student_quantile
-from .pictures import library
+from ..looks.drawing import library, saved
 
 ACROSS = 3
 # Drifts drawn, the least likely ones.
@@ -48,9 +47,7 @@ def render(
             _parameter(axes, name, fine, rows, found)
         for axes, drift in zip(panels.flat[len(names) :], drifts, strict=False):
             _drift(axes, drift)
-    buffer = BytesIO()
-    picture.savefig(buffer, format=format, dpi=110)
-    return buffer.getvalue()
+    return saved(picture, format, 110)
 
 
 def _parameter(axes, name: str, files: Sequence[File], rows: Mapping[str, Row], found: Summary):

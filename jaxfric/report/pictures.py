@@ -1,7 +1,5 @@
 """The picture of an identification: the friction curve over the data, and force against time."""
 
-from io import BytesIO
-
 import numpy as np
 
 from .. import signals
@@ -17,9 +15,7 @@ from ..units import VELOCITY, spell
 
 def render(found: Identified, recording: Recording, format: str = "png") -> bytes:
     """The picture as the content of a file, `png`, `pdf` or `svg`; raises as [`figure`][]."""
-    buffer = BytesIO()
-    figure(found, recording).savefig(buffer, format=format, dpi=130)
-    return buffer.getvalue()
+    return drawing.saved(figure(found, recording), format, 130)
 
 
 def figure(found: Identified, recording: Recording):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...looks.drawing import library
 from . import counting as counted
 from .counting import rate
 from .scoring import Score
@@ -17,10 +18,9 @@ def draw(scores: Sequence[Score], folder: Path) -> list[str]:
 
     **Raises:** `ValueError` without matplotlib.
     """
-    try:
-        import matplotlib
-    except ImportError as error:
-        raise ValueError('Pictures need matplotlib: pip install "jaxfric[report]".') from error
+    library()
+    import matplotlib
+
     drawn = []
     with matplotlib.rc_context({"font.size": 8, "figure.dpi": 120}):
         if any(s.kind != "pair" for s in scores):
@@ -39,9 +39,7 @@ def _save(figure, file: Path) -> None:
 
 
 def _figure(width: float, height: float):
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = library()(figsize=(width, height), layout="constrained")
     return figure, figure.add_subplot()
 
 
