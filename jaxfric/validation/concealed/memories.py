@@ -3,9 +3,7 @@
 import numpy as np
 
 from .machines import log_uniform
-from .nominal import Kind, bump, rms, scaled, solved, travelled
-
-TURN = 2 * np.pi
+from .nominal import TURN, Kind, bump, rms, scaled, solved, travelled
 
 
 def _mean_coulomb(n):

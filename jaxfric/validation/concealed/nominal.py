@@ -9,6 +9,7 @@ from numpy.random import Generator
 from .machines import Plan
 
 Truth = dict[str, Any]
+TURN = 2 * np.pi
 
 
 class Nominal(NamedTuple):
@@ -52,6 +53,11 @@ def _unbounded(n: Nominal) -> tuple[float, float]:
 
 def _as_it_is(truth: Truth, n: Nominal) -> Truth:
     return truth
+
+
+def no_physics(truth: Truth, base: Mapping[str, float]) -> dict[str, float]:
+    """What is a force along the motion alone changes nothing of the simulator."""
+    return {}
 
 
 class Columns(NamedTuple):

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import places, schedule
-from .memories import TURN
-from .nominal import Columns, Kind, Truth, rms, scaled
+from .nominal import TURN, Columns, Kind, Truth, rms, scaled
 
 # Cogging
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from . import curves, memories
 from .machines import log_uniform
-from .memories import TURN
-from .nominal import Columns, Kind, Truth, scaled, solved
+from .nominal import TURN, Columns, Kind, Truth, no_physics, scaled, solved
 from .variants import CLIP, LUGRE, MAXWELL, TANH
 
 
@@ -91,8 +90,8 @@ def _filtered(truth, clock, signal):
     return low_pass(signal, 1 - np.exp(-steps / truth["lag"]))
 
 
-TIMESTAMP = memories.DELAY._replace(physics=lambda truth, base: {}, logged=_old)
-LOGGED_LAG = memories.LAG._replace(physics=lambda truth, base: {}, logged=_filtered)
+TIMESTAMP = memories.DELAY._replace(physics=no_physics, logged=_old)
+LOGGED_LAG = memories.LAG._replace(physics=no_physics, logged=_filtered)
 
 # Friction
 
@@ -131,7 +130,7 @@ def _normal(truth, time):
 NORMAL: Kind = Kind(
     _draw_normal,
     lambda truth, n: truth["load_friction"] * _normal(truth, n.time) * n.way,
-    lambda truth, base: {},
+    no_physics,
     lambda truth: "the recorded load by direction",
     over=lambda truth, n, run: Columns(coulomb=truth["load_friction"] * _normal(truth, n.time)),
     channels=lambda truth, plan, run, clock: {"load": _normal(truth, clock)},

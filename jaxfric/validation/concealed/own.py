@@ -18,7 +18,7 @@ from ...terms.base import AbstractTerm
 from ...terms.effect import Effect, inside
 from ...terms.friction import Gaussian
 from ...terms.sample import Scales
-from .nominal import Kind, Nominal, Truth, rms, scaled
+from .nominal import Kind, Nominal, Truth, no_physics, rms, scaled
 
 # Shares of the compact set that nonlinear parameters are drawn from: not at its very ends.
 SHARES = (0.15, 0.85)
@@ -29,7 +29,7 @@ def by_law(effect: Effect) -> Kind:
     kind = Kind(
         functools.partial(_draw, effect),
         _force,
-        lambda truth, base: {},
+        no_physics,
         lambda truth: ", ".join(name.replace("_", " ") for name in effect.coordinates),
         centred=True,
         planted=not effect.needs - {"position"},

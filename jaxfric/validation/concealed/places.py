@@ -3,9 +3,7 @@
 import numpy as np
 
 from .machines import log_uniform
-from .nominal import Kind, Truth, named, rms, scaled
-
-TURN = 2 * np.pi
+from .nominal import TURN, Kind, Truth, named, rms, scaled
 
 
 def _at(n, share):

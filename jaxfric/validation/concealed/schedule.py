@@ -8,13 +8,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from . import motions
-from .nominal import Columns, Kind, rms, scaled
-
-TURN = 2 * np.pi
-
-
-def _nothing(truth, base):
-    return {}
+from .nominal import TURN, Columns, Kind, no_physics, rms, scaled
 
 
 def _length(n):
@@ -40,7 +34,7 @@ def _draw_thermal(rng, n, size):
 THERMAL: Kind = Kind(
     _draw_thermal,
     _thermal_force,
-    _nothing,
+    no_physics,
     lambda truth: f"{truth['law']} friction over time, constant {truth['time_constant']:.3g} s",
     planted=True,
     over=lambda truth, n, run: Columns(**{truth["law"]: _thermal_factor(truth, n.time)}),
@@ -58,7 +52,7 @@ def _draw_step(rng, n, size):
 STEP: Kind = Kind(
     _draw_step,
     lambda truth, n: truth["step_coulomb"] * n.way * (n.time > truth["step_time"]),
-    _nothing,
+    no_physics,
     lambda truth: f"friction from {truth['step_time']:.4g} s on",
     planted=True,
     over=lambda truth, n, run: Columns(
@@ -84,7 +78,7 @@ def _drift(truth, n):
 DRIFT: Kind = Kind(
     _draw_drift,
     _drift,
-    _nothing,
+    no_physics,
     lambda truth: "time, slowly",
     planted=True,
     over=lambda truth, n, run: Columns(_drift(truth, n)),
@@ -106,7 +100,7 @@ def _tone(truth, n):
 TONE: Kind = Kind(
     _draw_tone,
     _tone,
-    _nothing,
+    no_physics,
     lambda truth: f"time, {truth['frequency']:.4g} Hz",
     planted=True,
     over=lambda truth, n, run: Columns(_tone(truth, n)),
@@ -138,7 +132,7 @@ def _pulses(truth, n, times="times"):
 PULSES: Kind = Kind(
     _draw_pulses,
     _pulses,
-    _nothing,
+    no_physics,
     lambda truth: f"time, {len(truth['times'])} isolated pushes",
     planted=True,
     over=lambda truth, n, run: Columns(_pulses(truth, n, ("times", "times_holdout")[run])),
@@ -177,7 +171,7 @@ def _recorded(truth, plan, run, clock):
 CROSS: Kind = Kind(
     _draw_cross,
     _cross,
-    _nothing,
+    no_physics,
     lambda truth: "the other axis' motion",
     over=lambda truth, n, run: Columns(_cross(truth, n, run)),
     channels=_recorded,
