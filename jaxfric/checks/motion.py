@@ -152,6 +152,17 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
     return found | ({"velocity_gain": gain} if gain != 1 else {})
 
 
+def smoothed(recording: Recording, anew: signals.Derivable) -> dict[str, float]:
+    """By how much a recorded velocity errs where the axis turns, beside its top speed, where the
+    position knows it better and the column's own noise is no reason.
+    """
+    velocity = np.asarray(recording.velocity)[np.asarray(recording.mask)]
+    rough = signals.COLOURED * signals.counted_noise(velocity) ** 2
+    if not anew.off**2 > rough:
+        return {}
+    return {"velocity_smoothed": anew.off / float(np.quantile(np.abs(velocity), 0.98))}
+
+
 def _slow_gain(moved: np.ndarray, driven: np.ndarray, changed: np.ndarray, span: int) -> float:
     """How many times as fast as the velocity column says the position moves, if for sure; else 1.
 

@@ -33,7 +33,7 @@ from .motion import (
     scales as scales,
     velocity_noise as velocity_noise,
 )
-from .noise import counted_noise as counted_noise, white_noise as white_noise
+from .noise import COLOURED as COLOURED, counted_noise as counted_noise, white_noise as white_noise
 from .parabolas import (
     TRACED_REACH as TRACED_REACH,
     choose_half_width as choose_half_width,
@@ -45,3 +45,4 @@ from .polynomial import (
     Choice as Choice,
     smoothing as smoothing,
 )
+from .turns import Derivable as Derivable, derivable as derivable

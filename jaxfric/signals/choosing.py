@@ -123,7 +123,7 @@ def of_acceleration(recording: Recording, every: int = 1) -> tuple[Choice, ...]:
     own = None
     if recording.velocity is not None:
         own = choose(recording, np.asarray(recording.velocity))
-        if every != 1 or not _known(recording):
+        if every != 1 or not known_position(recording):
             return (own,)
     twice = choose(recording, order=2)
     if own is not None and not twice.error < BETTER * own.error:
@@ -132,7 +132,7 @@ def of_acceleration(recording: Recording, every: int = 1) -> tuple[Choice, ...]:
     return slope, max(slope, twice, key=lambda each: each.half_width)
 
 
-def _known(recording: Recording) -> bool:
+def known_position(recording: Recording) -> bool:
     """Whether the position is known at every valid sample."""
     position = recording.position
     if position is None:

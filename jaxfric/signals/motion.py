@@ -17,6 +17,7 @@ from .late_velocity import with_timely_velocity
 from .noise import host_white_noise, white_noise
 from .parabolas import TRACED_REACH, choose_half_width, local_quadratic
 from .polynomial import HALF_WIDTHS, Choice, weights
+from .turns import Derivable, derivable
 
 # Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
 # worth of the friction curve; it also bounds the dynamic range that a velocity grid has to cover.
@@ -30,16 +31,20 @@ def prepare(
 ) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
-    A recorded velocity is kept; one that is late beside the position is corrected. Else the
-    velocity is the zero-phase smoothing derivative of the position, by the local polynomial that
+    A recorded velocity is kept, and corrected where it is late beside the position, unless the
+    position [surely knows it better][jaxfric.signals.derivable]. Else the velocity is the
+    zero-phase smoothing derivative of the position, by the local polynomial that
     [`choose`][jaxfric.signals.choose] finds most accurate or by the one that is given; inside
     `jax.jit` by local parabolas, whose widths reach less far, and a recorded velocity is kept.
     Samples that are not finite but valid by their mask stay: `identify` reports them.
     `step`: the typical interval, s, where it is known.
     """
-    recording = with_timely_velocity(recording)
     if recording.velocity is not None:
-        return recording
+        recording = with_timely_velocity(recording)
+        anew = derivable(recording)
+        if anew is None or not anew.better:
+            return recording
+        choice = anew.choice if choice is None else choice
     if is_traced(recording):
         width = choose_half_width(recording, TRACED_REACH)
         span = (width + 0.5) * interval(recording)
@@ -56,16 +61,27 @@ def prepare(
 class Ready(NamedTuple):
     """A prepared recording, and the local polynomial that its velocity was derived by; `None` for
     one that was recorded.
+
+    Where there is a recorded one: `anew`, how the position derives it, and whether it was `late`.
     """
 
     recording: Recording
     choice: Choice | None
+    anew: Derivable | None = None
+    late: bool = False
 
     @classmethod
     def of(cls, recording: Recording) -> Self:
         """A recording that is not traced, prepared, with its signals of shape `(N,)`."""
-        choice = choose(recording) if recording.velocity is None else None
-        return cls(prepare(recording, choice), choice)
+        if recording.velocity is None:
+            choice = choose(recording)
+            return cls(prepare(recording, choice), choice)
+        timely = with_timely_velocity(recording)
+        anew, late = derivable(timely), timely is not recording
+        if anew is None or not anew.better:
+            return cls(timely, None, anew, late)
+        bare = dataclasses.replace(timely, velocity=None)
+        return cls(prepare(bare, anew.choice), anew.choice, anew, late)
 
 
 def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:
