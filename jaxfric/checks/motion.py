@@ -10,9 +10,6 @@ from ..signals.late_velocity import ALIKE, BLOCKS, FEWEST, SHARED
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
-# A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
-# small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
-UNCERTAIN = 0.01 / 2**0.5
 # A drive's own filter leaves the power of a recorded velocity within a few hundredths.
 GAIN = 1.05
 # Increments are 30 times their noise, which so takes 0.1 % off the scale: this is twice that. And
@@ -110,7 +107,7 @@ def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str,
     size = float(np.sqrt(np.mean(velocity**2))) if len(velocity) else 0.0
     if size == 0 or choice.error > NOISE_ONLY * size:
         return {"no_motion": 0.0}
-    if choice.error <= UNCERTAIN * size:
+    if choice.error <= signals.UNCERTAIN * size:
         return {}
     # Of bias and noise the larger one names it.
     biased = choice.bias**2 > 0.5 * choice.error**2

@@ -12,12 +12,12 @@ from ..data.recording import Recording
 from ..terms.sample import Scales
 from .choosing import choose
 from .clock import host_continuous, host_interval, interval, is_traced, quantile
+from .comparing import Derivable, derivable
 from .derivatives import derivative
 from .late_velocity import with_timely_velocity
 from .noise import host_white_noise, white_noise
 from .parabolas import TRACED_REACH, choose_half_width, local_quadratic
 from .polynomial import HALF_WIDTHS, Choice, weights
-from .turns import Derivable, derivable
 
 # Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
 # worth of the friction curve; it also bounds the dynamic range that a velocity grid has to cover.
@@ -39,12 +39,11 @@ def prepare(
     Samples that are not finite but valid by their mask stay: `identify` reports them.
     `step`: the typical interval, s, where it is known.
     """
+    recording, anew = measured(recording)
     if recording.velocity is not None:
-        recording = with_timely_velocity(recording)
-        anew = derivable(recording)
-        if anew is None or not anew.better:
-            return recording
-        choice = anew.choice if choice is None else choice
+        return recording
+    if choice is None and anew is not None:
+        choice = anew.choice
     if is_traced(recording):
         width = choose_half_width(recording, TRACED_REACH)
         span = (width + 0.5) * interval(recording)
@@ -58,11 +57,28 @@ def prepare(
     return dataclasses.replace(recording, velocity=derived)
 
 
+def measured(recording: Recording) -> tuple[Recording, Derivable | None]:
+    """A recording whose velocity is in time; without it, where the position tells it better.
+
+    So it does at the turns for sure, or of a velocity that is late, as by a filter, which takes off
+    what is fast, where it tells the velocity well.
+
+    **Returns:** also how the position would derive it anew, where both are recorded.
+    """
+    if recording.velocity is None:
+        return recording, None
+    timely = with_timely_velocity(recording)
+    anew = derivable(timely)
+    if anew is None or not (anew.better or (timely is not recording and anew.fine)):
+        return timely, anew
+    return dataclasses.replace(timely, velocity=None), anew
+
+
 class Ready(NamedTuple):
     """A prepared recording, and the local polynomial that its velocity was derived by; `None` for
     one that was recorded.
 
-    Where there is a recorded one: `anew`, how the position derives it, and whether it was `late`.
+    Of a recorded one: `anew`, how the position would derive it, and whether it was `late`.
     """
 
     recording: Recording
@@ -73,15 +89,12 @@ class Ready(NamedTuple):
     @classmethod
     def of(cls, recording: Recording) -> Self:
         """A recording that is not traced, prepared, with its signals of shape `(N,)`."""
-        if recording.velocity is None:
-            choice = choose(recording)
-            return cls(prepare(recording, choice), choice)
-        timely = with_timely_velocity(recording)
-        anew, late = derivable(timely), timely is not recording
-        if anew is None or not anew.better:
-            return cls(timely, None, anew, late)
-        bare = dataclasses.replace(timely, velocity=None)
-        return cls(prepare(bare, anew.choice), anew.choice, anew, late)
+        best, anew = measured(recording)
+        late = best.velocity is not None and best is not recording
+        if best.velocity is not None:
+            return cls(best, None, anew, late)
+        choice = choose(best) if anew is None else anew.choice
+        return cls(prepare(best, choice), choice, anew)
 
 
 def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:
