@@ -5,9 +5,10 @@ friction lies there. So what half of the kernel says is compared: while a parame
 than the interval that it has then, half of the kernel is taken; and the interval holds what the
 next half would say (the rule of Lepski 1991: the widest kernel that narrower ones do not refute).
 
-A velocity that was recorded beside the position is another measurement. One that was late has been
-through a filter, and gives way to the position as a wide kernel does. Another one stays; where the
-position says something else, beyond the intervals of both, its interval holds that too.
+A velocity that was recorded beside the position is another measurement. One that was late, or is
+doubtful at the turns, has been through a filter, and gives way to the position as a wide kernel
+does. Another one stays; where the position says something else, beyond the intervals of both, its
+interval holds that too.
 """
 
 import dataclasses
@@ -46,7 +47,7 @@ def narrowed(
     """
     rows, apart = list(rows), np.zeros(np.shape(_values(found)))
     going = np.ones(len(rows), bool)
-    recorded = np.array([row.choice is None and not row.late for row in rows])
+    recorded = np.array([row.choice is None and not row.filtered for row in rows])
     while True:
         halves = [_half(row) if go else None for row, go in zip(rows, going, strict=True)]
         going = np.array([half is not None for half in halves])

@@ -19,7 +19,8 @@ from .polynomial import HALF_WIDTHS, Choice, weights
 
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
 # small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
-UNCERTAIN = 0.01 / 2**0.5
+ALIKE = 0.01
+UNCERTAIN = ALIKE / 2**0.5
 # Slip is faster than four standard deviations of the noise.
 DEVIATIONS = 4.0
 # Blocks by which a standard error is known to a seventh, and three of those.
@@ -30,14 +31,18 @@ GAIN, SHARED = 1.05, 0.95
 
 
 class Derivable(NamedTuple):
-    """The local polynomial that derives a recorded velocity anew from the position, and whether
-    that is `fine`, within a hundredth of its size; `off`, m/s: by how much the recorded one errs at
-    the turns, root mean square, where that is surely more; else NaN.
+    """The local polynomial that derives a recorded velocity anew from the position.
+
+    `fine`: that errs by less than a hundredth, and the recorded one holds no more that it lacks;
+    `off`, m/s: by how much the recorded one errs at the turns, root mean square, where that is
+    surely more than a derivative of twice the width does; else NaN; `doubtful`: whether it surely
+    errs more than the derivative itself does.
     """
 
     choice: Choice
     fine: bool
-    off: float
+    off: float = float("nan")
+    doubtful: bool = False
 
     @property
     def better(self) -> bool:
@@ -65,22 +70,26 @@ def derivable(recording: Recording) -> Derivable | None:
     choice = choose(log)
     recorded = np.asarray(log.velocity, float)
     derived = derivative(log, np.asarray(log.position), choice.half_width, choice.degree)
-    inner = _inner(log, choice.half_width) & np.isfinite(recorded)
+    inner = _inner(log, _reach(choice)) & np.isfinite(recorded)
     if not _same_motion(recorded[inner], derived[inner]):
         return None
-    fine = choice.error <= UNCERTAIN * float(np.sqrt(np.mean(derived[inner] ** 2)))
+    size, apart = (np.sqrt(np.mean(x[inner] ** 2)) for x in (derived, recorded - derived))
+    fine = bool(choice.error <= UNCERTAIN * size and apart <= ALIKE * size)
     shape = weights(choice.half_width, choice.degree)
     noise = choice.noise / host_interval(log) * float(np.linalg.norm(shape))
     turns = inner & _near_ends(np.abs(derived) > DEVIATIONS * noise, choice.half_width)
     if np.count_nonzero(turns) < 2 * BLOCKS:
-        return Derivable(choice, fine, float("nan"))
+        return Derivable(choice, fine)
     columns = np.stack([derived, np.gradient(derived)], axis=1)[turns]
 
     def moved(off: np.ndarray) -> np.ndarray:
         return off - columns @ np.linalg.lstsq(columns, off)[0]
 
-    off = _errs_more(log, recorded, derived, choice, 1, turns, moved)
-    return Derivable(choice, fine, float("nan") if off is None else off)
+    off = _errs_more(log, recorded, choice, 1, turns, moved)
+    if off is not None:
+        return Derivable(choice, fine, off)
+    doubtful = _errs_more(log, recorded, choice, 1, turns, moved, times=2) is not None
+    return Derivable(choice, fine, doubtful=doubtful)
 
 
 def of_acceleration(recording: Recording, slope: Choice | None = None) -> tuple[Choice, ...]:
@@ -100,11 +109,10 @@ def of_acceleration(recording: Recording, slope: Choice | None = None) -> tuple[
     twice = choose(log, order=2)
     if own is not None:
         rate = derivative(log, np.asarray(log.velocity), own.half_width, own.degree)
-        second = derivative(log, np.asarray(log.position), twice.half_width, twice.degree, 2)
-        inner = _inner(log, max(own.half_width, twice.half_width)) & np.isfinite(rate)
+        inner = _inner(log, max(own.half_width, _reach(twice))) & np.isfinite(rate)
         if np.count_nonzero(inner) < 2 * BLOCKS:
             return (own,)
-        if _errs_more(log, rate, second, twice, 2, inner) is None:
+        if _errs_more(log, rate, twice, 2, inner) is None:
             return (own,)
     slope = choose(log) if slope is None else slope
     return slope, max(slope, twice, key=lambda each: each.half_width)
@@ -113,39 +121,48 @@ def of_acceleration(recording: Recording, slope: Choice | None = None) -> tuple[
 def _errs_more(
     log: Recording,
     own: np.ndarray,
-    derived: np.ndarray,
     choice: Choice,
     order: int,
     where: np.ndarray,
     left: Callable[[np.ndarray], np.ndarray] = lambda off: off,
+    times: int = 4,
 ) -> float | None:
     """By how much `own`, `(N,)`, errs in the samples `where`, root mean square, if surely more than
-    what the position's derivative of that `order` does by the polynomial `choice`; else `None`.
+    a wide derivative of the position of that `order` and the degree of `choice`; else `None`.
 
-    With a narrower derivative x_n of weights k_n, the chosen one x_c of weights k_c and the
-    position's noise σ, a signal x errs more where
+    With a narrow derivative x_n of weights k_n, the wide one x_w of weights k_w and the position's
+    noise σ, a signal x errs more where
 
-        E (x - x_n)² > E (x_c - x_n)² + 2 σ² k_c·k_n,
+        E (x - x_n)² > E (x_w - x_n)² + 2 σ² k_w·k_n,
 
-    an estimate without bias of the difference of their risks (as in Mallows 1973, Some comments on
-    C_p). It has to be so for sure beside half of the width, and on the whole beside a quarter,
-    whose noise is large: half of it may swallow a ripple that x holds. `left`: what counts of
-    x - x_n.
+    an estimate of the difference of their risks (as in Mallows 1973, Some comments on C_p), without
+    bias as far as x_n has none: beside one `times` as wide it has little. It has to be so for sure
+    beside half of the width that was chosen, and on the whole beside a quarter, whose noise is
+    large: half of it may swallow a ripple that x holds. `left`: what counts of x - x_n.
     """
+    degree = choice.degree
+    least = max(HALF_WIDTHS[0], degree // 2)
+    pilots = [max(choice.half_width // part, least) for part in (2, 4)]
+    reach = times * pilots[0]
     noise = (choice.noise / host_interval(log) ** order) ** 2
-    shape = weights(choice.half_width, choice.degree, order)
+    position, shape = np.asarray(log.position), weights(reach, degree, order)
+    wide = derivative(log, position, reach, degree, order)[where]
 
     def more(pilot: int) -> np.ndarray:
-        degree = min(choice.degree, 2 * pilot)
-        narrow = derivative(log, np.asarray(log.position), pilot, degree, order)[where]
-        off, apart = left(own[where] - narrow), derived[where] - narrow
-        shared = noise * float(shape @ weights(pilot, degree, order, choice.half_width))
+        narrow = derivative(log, position, pilot, degree, order)[where]
+        off, apart = left(own[where] - narrow), wide - narrow
+        shared = noise * float(shape @ weights(pilot, degree, order, reach))
         larger = off**2 - apart**2 - 2 * shared
         return np.array([np.mean(part) for part in np.array_split(larger, BLOCKS)])
 
-    half, quarter = (more(max(choice.half_width // part, HALF_WIDTHS[0])) for part in (2, 4))
+    half, quarter = map(more, pilots)
     sure = np.mean(half) > SURE * np.std(half, ddof=1) / np.sqrt(BLOCKS)
     return float(np.sqrt(np.mean(half))) if sure and np.mean(quarter) > 0 else None
+
+
+def _reach(choice: Choice) -> int:
+    """The half-width of the widest derivative that is compared with."""
+    return 2 * max(choice.half_width, 2 * HALF_WIDTHS[0], choice.degree)
 
 
 def _known_position(recording: Recording) -> bool:

@@ -78,21 +78,22 @@ class Ready(NamedTuple):
     """A prepared recording, and the local polynomial that its velocity was derived by; `None` for
     one that was recorded.
 
-    Of a recorded one: `anew`, how the position would derive it, and whether it was `late`.
+    Of a recorded one: `anew`, how the position would derive it; `filtered`, whether it was late or
+    is doubtful at the turns.
     """
 
     recording: Recording
     choice: Choice | None
     anew: Derivable | None = None
-    late: bool = False
+    filtered: bool = False
 
     @classmethod
     def of(cls, recording: Recording) -> Self:
         """A recording that is not traced, prepared, with its signals of shape `(N,)`."""
         best, anew = measured(recording)
-        late = best.velocity is not None and best is not recording
         if best.velocity is not None:
-            return cls(best, None, anew, late)
+            late, doubtful = best is not recording, anew is not None and anew.doubtful
+            return cls(best, None, anew, late or doubtful)
         choice = choose(best) if anew is None else anew.choice
         return cls(prepare(best, choice), choice, anew)
 
