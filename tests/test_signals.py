@@ -314,9 +314,9 @@ def test_a_late_velocity_keeps_what_is_too_fast_for_the_derivative():
     """An encoder of 300 counts a stroke, and a cogging of the speed, ten samples a cycle."""
     time = np.arange(8000) / 1000
     speed = np.sin(9 * time) + 0.6 * np.sin(31 * time)
-    place = np.cumsum(speed) / 1000
-    count = np.ptp(place) / 300
     ripple = 0.02 * np.sin(2 * np.pi * 100 * time)
+    place = np.cumsum(speed + ripple) / 1000
+    count = np.ptp(place) / 300
     late = filtered(time, speed, 5e-3) + np.roll(ripple, 5)
     record = log(time, np.round(place / count) * count, velocity=late)
     found = np.asarray(signals.prepare(record).velocity)[500:-500]

@@ -78,8 +78,14 @@ KINDS = (
         "velocity_late",
         False,
         "The velocity column is {value:.3g} s late beside the position, as by a filter or a cycle, "
-        "so that friction would change its sign at the wrong time. It is taken earlier by whole "
-        "samples, and what the filter took off it is added from the position.",
+        "so that friction would change its sign at the wrong time. The position corrects it.",
+    ),
+    Kind(
+        "velocity_smoothed",
+        False,
+        "Where the axis turns, the velocity column is off by {value:.2%} of the top speed, as by a "
+        "filter, and the position knows it better. It is derived from the position instead. "
+        "To keep the column, leave the position out: --columns position= .",
     ),
     Kind(
         "velocity_shifted",

@@ -10,9 +10,6 @@ from ..signals.late_velocity import ALIKE, BLOCKS, FEWEST, SHARED
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
-# A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
-# small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
-UNCERTAIN = 0.01 / 2**0.5
 # A drive's own filter leaves the power of a recorded velocity within a few hundredths.
 GAIN = 1.05
 # Increments are 30 times their noise, which so takes 0.1 % off the scale: this is twice that. And
@@ -110,7 +107,7 @@ def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str,
     size = float(np.sqrt(np.mean(velocity**2))) if len(velocity) else 0.0
     if size == 0 or choice.error > NOISE_ONLY * size:
         return {"no_motion": 0.0}
-    if choice.error <= UNCERTAIN * size:
+    if choice.error <= signals.UNCERTAIN * size:
         return {}
     # Of bias and noise the larger one names it.
     biased = choice.bias**2 > 0.5 * choice.error**2
@@ -150,6 +147,17 @@ def compared(recording: Recording, clock: Clock) -> dict[str, float]:
         both = _slow_gain(moved, driven, changed, span), _slow_gain(a, b, changed[late], span)
         gain = min(both, key=lambda each: abs(each - 1))
     return found | ({"velocity_gain": gain} if gain != 1 else {})
+
+
+def smoothed(recording: Recording, anew: signals.Derivable) -> dict[str, float]:
+    """By how much a recorded velocity errs where the axis turns, beside its top speed, where the
+    position knows it better and the column's own noise is no reason.
+    """
+    velocity = np.asarray(recording.velocity)[np.asarray(recording.mask)]
+    rough = signals.COLOURED * signals.counted_noise(velocity) ** 2
+    if not anew.off**2 > rough:
+        return {}
+    return {"velocity_smoothed": anew.off / float(np.quantile(np.abs(velocity), 0.98))}
 
 
 def _slow_gain(moved: np.ndarray, driven: np.ndarray, changed: np.ndarray, span: int) -> float:

@@ -19,6 +19,7 @@ from .motion import (
     derivative_faults,
     jumps,
     position_faults,
+    smoothed,
     speed_faults,
 )
 from .screening import Rows, Suspect, suspects
@@ -86,8 +87,9 @@ class _Log(NamedTuple):
                 found |= compared(recording, self.clock)
         ready = self.ready
         if ready is None:
-            kept = recording.velocity is not None and "velocity_late" not in found
-            ready = signals.Ready(recording, None) if kept else signals.Ready.of(recording)
+            ready = signals.Ready.of(recording)
+        if ready.anew is not None:
+            found |= smoothed(recording, ready.anew)
         return self._replace(found=found, ready=ready)
 
     def looked_at(

@@ -4,6 +4,11 @@ The kernel that errs least over a whole record takes most off where the axis tur
 friction lies there. So what half of the kernel says is compared: while a parameter moves by more
 than the interval that it has then, half of the kernel is taken; and the interval holds what the
 next half would say (the rule of Lepski 1991: the widest kernel that narrower ones do not refute).
+
+A velocity that was recorded beside the position is another measurement. One that was late, or is
+doubtful at the turns, has been through a filter, and gives way to the position as a wide kernel
+does. Another one stays; where the position says something else, beyond the intervals of both, its
+interval holds that too.
 """
 
 import dataclasses
@@ -41,7 +46,8 @@ def narrowed(
     **Returns:** the same, and by how much the parameters move with half of the kernel, `(..., P)`.
     """
     rows, apart = list(rows), np.zeros(np.shape(_values(found)))
-    going = np.array([row.choice is not None for row in rows])
+    going = np.ones(len(rows), bool)
+    recorded = np.array([row.choice is None and not row.filtered for row in rows])
     while True:
         halves = [_half(row) if go else None for row, go in zip(rows, going, strict=True)]
         going = np.array([half is not None for half in halves])
@@ -51,12 +57,14 @@ def narrowed(
         recording = prepared(tried)
         other, its = solve(*setup._replace(recording=recording))
         moved = np.atleast_2d(_values(other) - _values(found))
-        half = np.atleast_2d(_half_widths(other))
+        own, half = (np.atleast_2d(_half_widths(each)) for each in (found, other))
         known = np.isfinite(moved) & np.isfinite(half)
         sure = np.atleast_1d(np.asarray(other.result == Result.successful))
-        refuted = going & sure & np.any(known & (np.abs(moved) > half), axis=1)
-        confirmed = (going & ~refuted)[:, None] & known
-        apart = np.where(confirmed, moved, np.atleast_2d(apart)).reshape(apart.shape)
+        refuted = going & ~recorded & sure & np.any(known & (np.abs(moved) > half), axis=1)
+        counted = known & (going & ~refuted)[:, None]
+        unlike = sure[:, None] & (np.abs(moved) > own + half)
+        counted &= np.where(recorded[:, None], unlike, True)
+        apart = np.where(counted, moved, np.atleast_2d(apart)).reshape(apart.shape)
         taken = refuted if recording.time.ndim == 2 else refuted[0]
         found, design = _where(taken, (other, its), (found, design))
         setup = setup._replace(recording=_where(taken, recording, setup.recording))
@@ -74,10 +82,13 @@ def reaching(found: Identified, apart: np.ndarray) -> Identified:
 
 def _half(row: signals.Ready) -> signals.Ready | None:
     """The row with its velocity by half of the kernel; `None` where there is no such."""
-    width = row.choice.half_width // 2
-    if width < HALF_WIDTHS[0] or 2 * width < row.choice.degree:
+    choice = row.choice or (row.anew and row.anew.choice)
+    if choice is None:
         return None
-    choice = row.choice._replace(half_width=width)
+    width = choice.half_width // 2
+    if width < HALF_WIDTHS[0] or 2 * width < choice.degree:
+        return None
+    choice = choice._replace(half_width=width)
     bare = dataclasses.replace(row.recording, velocity=None)
     return row._replace(recording=signals.prepare(bare, choice), choice=choice)
 

@@ -1,6 +1,6 @@
 """Velocity without phase lag, noise, magnitudes, and what counts as slip."""
 
-from .choosing import choose as choose, of_acceleration as of_acceleration
+from .choosing import choose as choose
 from .clock import (
     GAP_FACTOR as GAP_FACTOR,
     continuous as continuous,
@@ -10,6 +10,12 @@ from .clock import (
     interval as interval,
     is_traced as is_traced,
     quantile as quantile,
+)
+from .comparing import (
+    UNCERTAIN as UNCERTAIN,
+    Derivable as Derivable,
+    derivable as derivable,
+    of_acceleration as of_acceleration,
 )
 from .derivatives import derivative as derivative, part_of as part_of
 from .kernels import (
@@ -29,11 +35,12 @@ from .motion import (
     counter_velocity as counter_velocity,
     host_scales as host_scales,
     kernel_half_width as kernel_half_width,
+    measured as measured,
     prepare as prepare,
     scales as scales,
     velocity_noise as velocity_noise,
 )
-from .noise import counted_noise as counted_noise, white_noise as white_noise
+from .noise import COLOURED as COLOURED, counted_noise as counted_noise, white_noise as white_noise
 from .parabolas import (
     TRACED_REACH as TRACED_REACH,
     choose_half_width as choose_half_width,

@@ -28,11 +28,6 @@ FEWEST = 32
 # eight times as many centres as of the others.
 NUMBERS, NARROW = 2**18, 32
 
-# The position is taken where its acceleration is expected to err by a tenth: the noise of counts,
-# and of a velocity that a drive has filtered, is not white, so that either estimate may be three
-# times off. With a fifth, the width for a servo's counts took away its ripple at speed.
-BETTER = 0.1
-
 
 class _Level(NamedTuple):
     """Candidates at common centres: `keys` (degree, half-width in samples), whether each may be
@@ -110,34 +105,6 @@ def _risks(levels: list[_Level], noise: float) -> list[tuple[float, float, int, 
         risks = zip((bias + roughs).tolist(), bias.tolist(), widths.tolist(), strict=True)
         tried += [(risk, lost, degree, int(half)) for risk, lost, half in risks]
     return tried
-
-
-def of_acceleration(recording: Recording, every: int = 1) -> tuple[Choice, ...]:
-    """The local polynomials by which the acceleration is taken, m/s², one after the other.
-
-    That which is best for a recorded velocity; or two for the position, where no velocity is
-    recorded or the position is expected to err by less than [`BETTER`][] of it: of the first
-    derivative, and then the wider of those that are best for the first and the second. A position
-    that is not known at every sample, but at one in `every`, is none to derive from.
-    """
-    own = None
-    if recording.velocity is not None:
-        own = choose(recording, np.asarray(recording.velocity))
-        if every != 1 or not _known(recording):
-            return (own,)
-    twice = choose(recording, order=2)
-    if own is not None and not twice.error < BETTER * own.error:
-        return (own,)
-    slope = choose(recording)
-    return slope, max(slope, twice, key=lambda each: each.half_width)
-
-
-def _known(recording: Recording) -> bool:
-    """Whether the position is known at every valid sample."""
-    position = recording.position
-    if position is None:
-        return False
-    return bool(np.isfinite(np.asarray(position)[np.asarray(recording.mask)]).all())
 
 
 class _Rung(NamedTuple):

@@ -12,6 +12,7 @@ from ..data.recording import Recording
 from ..terms.sample import Scales
 from .choosing import choose
 from .clock import host_continuous, host_interval, interval, is_traced, quantile
+from .comparing import Derivable, derivable
 from .derivatives import derivative
 from .late_velocity import with_timely_velocity
 from .noise import host_white_noise, white_noise
@@ -30,16 +31,19 @@ def prepare(
 ) -> Recording:
     """A recording with a velocity and without values that cannot be computed with.
 
-    A recorded velocity is kept; one that is late beside the position is corrected. Else the
-    velocity is the zero-phase smoothing derivative of the position, by the local polynomial that
+    A recorded velocity is kept, and corrected where it is late beside the position, unless the
+    position [surely knows it better][jaxfric.signals.derivable]. Else the velocity is the
+    zero-phase smoothing derivative of the position, by the local polynomial that
     [`choose`][jaxfric.signals.choose] finds most accurate or by the one that is given; inside
     `jax.jit` by local parabolas, whose widths reach less far, and a recorded velocity is kept.
     Samples that are not finite but valid by their mask stay: `identify` reports them.
     `step`: the typical interval, s, where it is known.
     """
-    recording = with_timely_velocity(recording)
+    recording, anew = measured(recording)
     if recording.velocity is not None:
         return recording
+    if choice is None and anew is not None:
+        choice = anew.choice
     if is_traced(recording):
         width = choose_half_width(recording, TRACED_REACH)
         span = (width + 0.5) * interval(recording)
@@ -53,19 +57,45 @@ def prepare(
     return dataclasses.replace(recording, velocity=derived)
 
 
+def measured(recording: Recording) -> tuple[Recording, Derivable | None]:
+    """A recording whose velocity is in time; without it, where the position tells it better.
+
+    So it does at the turns for sure, or of a velocity that is late, as by a filter, which takes off
+    what is fast, where it tells the velocity well.
+
+    **Returns:** also how the position would derive it anew, where both are recorded.
+    """
+    if recording.velocity is None:
+        return recording, None
+    timely = with_timely_velocity(recording)
+    anew = derivable(timely)
+    if anew is None or not (anew.better or (timely is not recording and anew.fine)):
+        return timely, anew
+    return dataclasses.replace(timely, velocity=None), anew
+
+
 class Ready(NamedTuple):
     """A prepared recording, and the local polynomial that its velocity was derived by; `None` for
     one that was recorded.
+
+    Of a recorded one: `anew`, how the position would derive it; `filtered`, whether it was late or
+    is doubtful at the turns.
     """
 
     recording: Recording
     choice: Choice | None
+    anew: Derivable | None = None
+    filtered: bool = False
 
     @classmethod
     def of(cls, recording: Recording) -> Self:
         """A recording that is not traced, prepared, with its signals of shape `(N,)`."""
-        choice = choose(recording) if recording.velocity is None else None
-        return cls(prepare(recording, choice), choice)
+        best, anew = measured(recording)
+        if best.velocity is not None:
+            late, doubtful = best is not recording, anew is not None and anew.doubtful
+            return cls(best, None, anew, late or doubtful)
+        choice = choose(best) if anew is None else anew.choice
+        return cls(prepare(best, choice), choice, anew)
 
 
 def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Array, ""]:

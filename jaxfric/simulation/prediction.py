@@ -54,30 +54,29 @@ class Prepared:
         """The same, of one of few lengths, so that few programs serve all recordings; a long one,
         of which a copy counts, as it is.
         """
-        short, every = recording.num_samples <= MOST, recording.position_every
-        return cls(uniform(recording) if short else recording, every=every)
+        return cls(recording, padded=recording.num_samples <= MOST)
 
-    def __init__(
-        self, recording: Recording, whole: "Prepared | None" = None, every: int | None = None
-    ):
-        self.recorded = recording  # whose noise is that of a late velocity, corrected, too
+    def __init__(self, recording: Recording, whole: "Prepared | None" = None, padded: bool = False):
         self._whole = whole  # of which it is a part
-        self._derived = recording.velocity is None
         # By which the acceleration is taken, outside jit.
         self._chosen: tuple[signals.Choice, ...] = ()
         if whole is not None:
             self._chosen = whole._chosen
         elif not signals.is_traced(recording):
-            self._chosen = signals.of_acceleration(recording, every or recording.position_every)
+            recording, anew = signals.measured(recording)
+            slope = None if anew is None else anew.choice
+            self._chosen = signals.of_acceleration(recording, slope)
+        self._derived = recording.velocity is None
+        self.recorded = uniform(recording) if padded else recording
         # By which the momentum's velocity is derived from the position.
         self._slope = self._chosen[0] if len(self._chosen) > 1 else None
 
     @cached_property
     def recording(self) -> Recording:
         """The recording with its velocity."""
-        if self._whole is not None and not self._derived:
-            return self.recorded
-        return signals.prepare(self.recorded, self._slope, self.step)
+        if self._derived:
+            return signals.prepare(self.recorded, self._slope, self.step)
+        return self.recorded
 
     @cached_property
     def velocity(self) -> Array | np.ndarray:
