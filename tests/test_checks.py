@@ -205,9 +205,7 @@ def test_a_recorded_velocity_with_spikes_and_a_motion_one_way():
     sound = log()
     spiked = np.asarray(sound.velocity).copy()
     spiked[[2000, 6000]] *= -4
-    assert names(changed(sound, velocity=spiked, position=None)) == ["velocity_spikes"]
-    # The position knows better, and is taken.
-    assert names(changed(sound, velocity=spiked)) == []
+    assert names(changed(sound, velocity=spiked)) == ["velocity_spikes"]
     forward = np.asarray(sound.velocity) > 0
     assert "one_direction" in names(changed(sound, mask=forward))
 
