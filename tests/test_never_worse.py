@@ -329,9 +329,9 @@ def test_a_velocity_of_encoder_differences_is_derived_anew_from_the_position(cou
     bare = dataclasses.replace(run, velocity=None)
     assert force_error(model, run) < 0.02
     assert force_error(model, run) == pytest.approx(force_error(model, bare), rel=0.2)
-    # Its differences are half a sample late, and friction has the velocity of the position, too.
-    ours, theirs = (Prepared(each).recording.velocity[10:-10] for each in (run, bare))
-    np.testing.assert_allclose(ours, theirs, atol=1e-4)
+    # Friction has the recorded velocity, which says where the axis rests.
+    motion = Prepared(run)
+    assert np.std(motion.recording.velocity - motion.velocity) > 1e-4
 
 
 def test_a_velocity_of_its_own_sensor_is_kept_beside_a_coarse_position():

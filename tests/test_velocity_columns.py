@@ -103,12 +103,3 @@ def test_a_smoothed_column_takes_nothing_off_the_bump(axis, reach):
     # The same beside others in a batch.
     both = jf.identify(model, jf.stack([axis, smoothed]))
     np.testing.assert_allclose(both.model.alpha[1], fits[0].model.alpha, rtol=1e-6)
-
-
-def test_the_force_of_a_noisy_column_is_predicted_by_the_position(axis):
-    noise = 0.01 * np.random.default_rng(1).normal(size=axis.num_samples)
-    noisy = dataclasses.replace(axis, velocity=np.asarray(axis.velocity) + noise)
-    alone = dataclasses.replace(axis, velocity=None)
-    model = jf.scenario.machine()
-    found, wanted = (np.asarray(jf.predict(model, each)) for each in (noisy, alone))
-    np.testing.assert_allclose(found, wanted, atol=1e-6)

@@ -1,8 +1,7 @@
 """Which tells the motion better, the position or a velocity that is recorded beside it.
 
 On the host. A drive's velocity has been through a filter, or is a quotient of counts; the position
-may be coarse. Both are compared with narrower derivatives of the position, which err by their noise
-alone.
+may be coarse.
 """
 
 from collections.abc import Callable
@@ -28,6 +27,11 @@ BLOCKS, SURE = 24, 3.0
 # The same motion: a filter leaves the size of a velocity within a few hundredths, and takes a
 # twentieth of its power at the most.
 GAIN, SHARED = 1.05, 0.95
+
+# The position is taken where its acceleration is expected to err by a tenth: the noise of counts,
+# and of a velocity that a drive has filtered, is not white, so that either estimate may be three
+# times off. With a fifth, the width for a servo's counts took away its ripple at speed.
+BETTER = 0.1
 
 
 class Derivable(NamedTuple):
@@ -85,73 +89,65 @@ def derivable(recording: Recording) -> Derivable | None:
     def moved(off: np.ndarray) -> np.ndarray:
         return off - columns @ np.linalg.lstsq(columns, off)[0]
 
-    off = _errs_more(log, recorded, choice, 1, turns, moved)
+    off = _errs_more(log, choice, turns, moved)
     if off is not None:
         return Derivable(choice, fine, off)
-    doubtful = _errs_more(log, recorded, choice, 1, turns, moved, times=2) is not None
+    doubtful = _errs_more(log, choice, turns, moved, times=2) is not None
     return Derivable(choice, fine, doubtful=doubtful)
 
 
-def of_acceleration(recording: Recording, slope: Choice | None = None) -> tuple[Choice, ...]:
+def of_acceleration(recording: Recording) -> tuple[Choice, ...]:
     """The local polynomials by which the acceleration is taken, m/s², one after the other.
 
     That which is best for a recorded velocity; or two for the position, where no velocity is
-    recorded or its derivative surely errs more than the position's second one: of the first
-    derivative (`slope`, if known), and then the wider of those that are best for the first and the
-    second. A position that is not known at every sample is none to derive from.
+    recorded or the position is expected to err by less than [`BETTER`][] of it: of the first
+    derivative, and then the wider of those that are best for the first and the second. A position
+    that is not known at every sample is none to derive from.
     """
     own = None
-    log = excerpt(recording)
-    if log.velocity is not None:
-        own = choose(log, np.asarray(log.velocity))
-        if not _known_position(log):
+    if recording.velocity is not None:
+        own = choose(recording, np.asarray(recording.velocity))
+        if not _known_position(recording):
             return (own,)
-    twice = choose(log, order=2)
-    if own is not None:
-        rate = derivative(log, np.asarray(log.velocity), own.half_width, own.degree)
-        inner = _inner(log, max(own.half_width, _reach(twice))) & np.isfinite(rate)
-        if np.count_nonzero(inner) < 2 * BLOCKS:
-            return (own,)
-        if _errs_more(log, rate, twice, 2, inner) is None:
-            return (own,)
-    slope = choose(log) if slope is None else slope
+    twice = choose(recording, order=2)
+    if own is not None and not twice.error < BETTER * own.error:
+        return (own,)
+    slope = choose(recording)
     return slope, max(slope, twice, key=lambda each: each.half_width)
 
 
 def _errs_more(
     log: Recording,
-    own: np.ndarray,
     choice: Choice,
-    order: int,
     where: np.ndarray,
-    left: Callable[[np.ndarray], np.ndarray] = lambda off: off,
+    left: Callable[[np.ndarray], np.ndarray],
     times: int = 4,
 ) -> float | None:
-    """By how much `own`, `(N,)`, errs in the samples `where`, root mean square, if surely more than
-    a wide derivative of the position of that `order` and the degree of `choice`; else `None`.
+    """By how much the recorded velocity errs in the samples `where`, root mean square, if surely
+    more than a wide derivative of the position of the degree of `choice`; else `None`.
 
-    With a narrow derivative x_n of weights k_n, the wide one x_w of weights k_w and the position's
-    noise σ, a signal x errs more where
+    With a narrow derivative v_n of weights k_n, the wide one v_w of weights k_w and the position's
+    noise σ, the recorded velocity v errs more where
 
-        E (x - x_n)² > E (x_w - x_n)² + 2 σ² k_w·k_n,
+        E (v - v_n)² > E (v_w - v_n)² + 2 σ² k_w·k_n,
 
     an estimate of the difference of their risks (as in Mallows 1973, Some comments on C_p), without
-    bias as far as x_n has none: beside one `times` as wide it has little. It has to be so for sure
+    bias as far as v_n has none: beside one `times` as wide it has little. It has to be so for sure
     beside half of the width that was chosen, and on the whole beside a quarter, whose noise is
-    large: half of it may swallow a ripple that x holds. `left`: what counts of x - x_n.
+    large: half of it may swallow a ripple that v holds. `left`: what counts of v - v_n.
     """
     degree = choice.degree
     least = max(HALF_WIDTHS[0], degree // 2)
     pilots = [max(choice.half_width // part, least) for part in (2, 4)]
     reach = times * pilots[0]
-    noise = (choice.noise / host_interval(log) ** order) ** 2
-    position, shape = np.asarray(log.position), weights(reach, degree, order)
-    wide = derivative(log, position, reach, degree, order)[where]
+    noise = (choice.noise / host_interval(log)) ** 2
+    position, shape = np.asarray(log.position), weights(reach, degree)
+    own, wide = np.asarray(log.velocity, float)[where], derivative(log, position, reach, degree)
 
     def more(pilot: int) -> np.ndarray:
-        narrow = derivative(log, position, pilot, degree, order)[where]
-        off, apart = left(own[where] - narrow), wide - narrow
-        shared = noise * float(shape @ weights(pilot, degree, order, reach))
+        narrow = derivative(log, position, pilot, degree)[where]
+        off, apart = left(own - narrow), wide[where] - narrow
+        shared = noise * float(shape @ weights(pilot, degree, reach=reach))
         larger = off**2 - apart**2 - 2 * shared
         return np.array([np.mean(part) for part in np.array_split(larger, BLOCKS)])
 

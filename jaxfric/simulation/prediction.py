@@ -63,9 +63,9 @@ class Prepared:
         if whole is not None:
             self._chosen = whole._chosen
         elif not signals.is_traced(recording):
-            recording, anew = signals.measured(recording)
-            slope = None if anew is None else anew.choice
-            self._chosen = signals.of_acceleration(recording, slope)
+            # The noise of a late velocity is that of the corrected one, too.
+            self._chosen = signals.of_acceleration(recording)
+            recording = signals.with_timely_velocity(recording)
         self._derived = recording.velocity is None
         self.recorded = uniform(recording) if padded else recording
         # By which the momentum's velocity is derived from the position.
