@@ -6,12 +6,11 @@ import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
+from ..signals.comparing import GAIN
 from ..signals.late_velocity import ALIKE, BLOCKS, FEWEST, SHARED
 from .clock import Clock
 from .lone import CYCLE, LONE, PIECE, SPAN, lone
 
-# A drive's own filter leaves the power of a recorded velocity within a few hundredths.
-GAIN = 1.05
 # Increments are 30 times their noise, which so takes 0.1 % off the scale: this is twice that. And
 # three standard errors, which chance exceeds on some axes in a thousand.
 SCALE, SURE = 0.002, 3.0

@@ -29,7 +29,6 @@ from .late_velocity import (
     with_timely_velocity as with_timely_velocity,
 )
 from .motion import (
-    SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     SLIP_SHARE as SLIP_SHARE,
     Ready as Ready,
     counter_velocity as counter_velocity,
@@ -40,7 +39,12 @@ from .motion import (
     scales as scales,
     velocity_noise as velocity_noise,
 )
-from .noise import COLOURED as COLOURED, counted_noise as counted_noise, white_noise as white_noise
+from .noise import (
+    COLOURED as COLOURED,
+    SLIP_DEVIATIONS as SLIP_DEVIATIONS,
+    counted_noise as counted_noise,
+    white_noise as white_noise,
+)
 from .parabolas import (
     TRACED_REACH as TRACED_REACH,
     choose_half_width as choose_half_width,

@@ -14,14 +14,13 @@ from ..data.recording import Recording
 from .choosing import choose
 from .clock import host_continuous, host_interval, is_traced
 from .derivatives import derivative
+from .noise import SLIP_DEVIATIONS
 from .polynomial import HALF_WIDTHS, Choice, weights
 
 # A derived velocity is off by a hundredth of its size at the most. The estimate of the error is too
 # small as a rule, by √2, since no bias is seen of what changes faster than the kernel.
-ALIKE = 0.01
-UNCERTAIN = ALIKE / 2**0.5
-# Slip is faster than four standard deviations of the noise.
-DEVIATIONS = 4.0
+HUNDREDTH = 0.01
+UNCERTAIN = HUNDREDTH / 2**0.5
 # Blocks by which a standard error is known to a seventh, and three of those.
 BLOCKS, SURE = 24, 3.0
 # The same motion: a filter leaves the size of a velocity within a few hundredths, and takes a
@@ -37,7 +36,7 @@ BETTER = 0.1
 class Derivable(NamedTuple):
     """The local polynomial that derives a recorded velocity anew from the position.
 
-    `fine`: that errs by less than a hundredth, and the recorded one holds no more that it lacks;
+    `fine`: whether that errs by less than a hundredth, and the recorded one is as near to it;
     `off`, m/s: by how much the recorded one errs at the turns, root mean square, where that is
     surely more than a derivative of twice the width does; else NaN; `doubtful`: whether it surely
     errs more than the derivative itself does.
@@ -78,10 +77,10 @@ def derivable(recording: Recording) -> Derivable | None:
     if not _same_motion(recorded[inner], derived[inner]):
         return None
     size, apart = (np.sqrt(np.mean(x[inner] ** 2)) for x in (derived, recorded - derived))
-    fine = bool(choice.error <= UNCERTAIN * size and apart <= ALIKE * size)
+    fine = bool(choice.error <= UNCERTAIN * size and apart <= HUNDREDTH * size)
     shape = weights(choice.half_width, choice.degree)
     noise = choice.noise / host_interval(log) * float(np.linalg.norm(shape))
-    turns = inner & _near_ends(np.abs(derived) > DEVIATIONS * noise, choice.half_width)
+    turns = inner & _near_ends(np.abs(derived) > SLIP_DEVIATIONS * noise, choice.half_width)
     if np.count_nonzero(turns) < 2 * BLOCKS:
         return Derivable(choice, fine)
     columns = np.stack([derived, np.gradient(derived)], axis=1)[turns]

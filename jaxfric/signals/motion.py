@@ -15,15 +15,13 @@ from .clock import host_continuous, host_interval, interval, is_traced, quantile
 from .comparing import Derivable, derivable
 from .derivatives import derivative
 from .late_velocity import with_timely_velocity
-from .noise import host_white_noise, white_noise
+from .noise import SLIP_DEVIATIONS, host_white_noise, white_noise
 from .parabolas import TRACED_REACH, choose_half_width, local_quadratic
 from .polynomial import HALF_WIDTHS, Choice, weights
 
 # Slower than this share of the 98 % quantile of the speed, a reversal takes less than a sample's
 # worth of the friction curve; it also bounds the dynamic range that a velocity grid has to cover.
 SLIP_SHARE = 0.006
-# Four standard deviations: one sample of noise in 16,000 passes for slip.
-SLIP_DEVIATIONS = 4.0
 
 
 def prepare(

@@ -18,6 +18,8 @@ from .clock import continuous
 # Counts of an encoder are no white noise where the motion is slow: between two widths they may
 # differ by twice what white noise of their size would, that is, four times in power.
 COLOURED = 4.0
+# Four standard deviations: one sample of noise in 16,000 passes for slip.
+SLIP_DEVIATIONS = 4.0
 # Shorter even stretches say little about the noise: two lengths of an eighth difference.
 SHORT = 16
 
