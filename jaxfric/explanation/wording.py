@@ -49,7 +49,7 @@ def summary(
         words = words | {verdict: REFUTED}
     said = DOUBTED if severe and not findings else words[verdict]
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
-    whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings))]
+    whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings), verdict)]
     return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit))])
 
 
@@ -61,7 +61,7 @@ def _not_confirmed(findings: Sequence[Finding]) -> str:
     )
 
 
-def _errors(fit: Mapping[str, Any], found: bool) -> str:
+def _errors(fit: Mapping[str, Any], found: bool, verdict: str) -> str:
     """The force errors, and what of them is noise."""
 
     def said(error: Mapping[str, float]) -> str:
@@ -73,21 +73,31 @@ def _errors(fit: Mapping[str, Any], found: bool) -> str:
         text += f"; on the held-out recording{adjusted(fit)} {said(held)}"
     if (floor := fit.get("noise_floor")) is not None and math.isfinite(floor):
         text += f"; {floor:.2%} is what noise alone makes"
-    return f"{text}.{_by_sample(fit)}"
+    return f"{text}.{_by_sample(fit, verdict)}"
 
 
 # A third of the force, a tenth of its power.
 LARGE = 0.3
 
 
-def _by_sample(fit: Mapping[str, Any]) -> str:
-    """What most of a large error is that no filter leaves: noise, or short events."""
+def _by_sample(fit: Mapping[str, Any], verdict: str) -> str:
+    """What most of a large error is that no filter leaves: noise, or short events.
+
+    Of a smaller error too where nothing is said to be missing, and most of it is no noise.
+    """
     if "filtered_force_error" not in fit:
         return ""
     whole, filtered = fit["force_error"]["after"], fit["filtered_force_error"]["after"]
     floor = fit.get("noise_floor")
     noisy = floor is not None and floor**2 > 0.5 * whole**2
-    if not whole > (LARGE if noisy else LEFT) or filtered > 0.5 * whole:
+    if filtered > 0.5 * whole:
+        return ""
+    if verdict == "consistent" and floor is not None and floor < 0.5 * whole <= 0.5 * LEFT:
+        return (
+            " What is more than that is short, as beside reversals: "
+            f"{filtered:.2%} is left through a filter."
+        )
+    if not whole > (LARGE if noisy else LEFT):
         return ""
     if noisy:
         what = "the noise of the acceleration"
