@@ -68,7 +68,7 @@ class Recording(eqx.Module):
     - `source`: where the recording comes from, for messages; `sha256`: of that file.
     - `num_segments`: a static bound on the number of segments; counted where `None`.
     - `position_every`: of a position that came at every so many samples only, and is a curve
-      through these since.
+      through these since; 0 of one that is the integral of the velocity.
 
     **Raises:** `ValueError` if the shapes differ or if neither position nor velocity is given.
     """

@@ -39,6 +39,7 @@ class Evidence(NamedTuple):
     - `limits`: magnitudes of the recording, `Scales` of floats; `reach`: the kernel's half-width,
       s; `width`: the same in samples.
     - `clock`: whether the time stamps increase throughout, so that time is a coordinate.
+    - `located`: whether a position was recorded; else there is none, or the velocity's integral.
     """
 
     motion: Recording
@@ -55,6 +56,7 @@ class Evidence(NamedTuple):
     reach: float
     width: int
     clock: bool
+    located: bool
 
     @property
     def half(self) -> int:
@@ -237,6 +239,7 @@ def gather(
         reach=span,
         width=step * half,
         clock=bool(np.all(np.diff(time) > 0)),
+        located=prepared.position is not None and motion.recording.position_every > 0,
     )
 
 

@@ -13,7 +13,7 @@ from ..identification.identified import Identified
 from ..models import Model, named
 from ..simulators import AbstractSimulator
 from ..terms.base import AbstractTerm
-from . import parameters as spelled, sanity, threads
+from . import parameters as spelled, sanity, threads, zero
 from .attributes import in_own_words
 from .baseline import Baseline, at_values, baseline_of
 from .doubts import contradicted
@@ -52,7 +52,8 @@ def explain(
 
     **Arguments:**
 
-    - `recording`, and `holdout`, for validation only: signals of shape `(N,)`.
+    - `recording`, and `holdout`, for validation only: signals of shape `(N,)`. Of velocity alone
+      the position is its integral; where the held-out one begins, it is fitted there.
     - `baseline`: a model's name or a sum of terms, whose parameters are fitted; a model or an
       identification, whose values are tested first (`parameter_mismatch`); another simulator's
       force along the recorded motion (`jf.simulators.Known`, any function from a recording to it,
@@ -124,7 +125,14 @@ def _explain(
     if held is not None:
         doing("validating on the held-out recording")
         check_signals(better.findings.selection, recording, holdout)
+        place = zero.zero_of(better.findings, held)
+        if place:
+            held = zero.beginning_at(held, place)
+            inputs.figures.held_from(place)
+        remarks += zero.integrated(better.findings, place)
         better = confirmed(better, held, inputs.figures)
+    else:
+        remarks += zero.integrated(better.findings, None)
     doing("locating what is left")
     wrong = wrong if better.refitted else None
     explanation = summarise(recording, better, known, wrong, inputs.figures, remarks, seed)

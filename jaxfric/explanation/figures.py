@@ -1,5 +1,6 @@
 """The force errors that a user gets: a saved model, `predict`, and a subtraction."""
 
+import dataclasses
 from collections.abc import Collection, Hashable
 
 import equinox as eqx
@@ -43,6 +44,14 @@ class Figures:
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
         self._errors: dict[Hashable, tuple[float, np.ndarray]] = {}
+
+    def held_from(self, place: float) -> None:
+        """Count the position of the held-out recording from another place, m."""
+        held = self._recordings["held"]
+        position = held.position + jnp.asarray(place, held.position.dtype)
+        self._recordings["held"] = dataclasses.replace(held, position=position)
+        for known in (self._prepared, self._moving, self._known, self._errors):
+            known.clear()
 
     def own(self, model: Model) -> Model:
         """The model in the precision of the recording."""

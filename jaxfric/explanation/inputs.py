@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from .. import checks
+from .. import checks, signals
 from ..checks import Remark
 from ..data.cleaning import between_updates, held_for
 from ..data.recording import Recording, check_same_units, require, require_force
@@ -89,6 +89,7 @@ def prepare(
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
     if isinstance(baseline, Earlier):
         baseline = baseline.recording
+    recording, baseline, holdout = map(_placed, (recording, baseline, holdout))
     if not isinstance(baseline, Recording):
         baseline_of(baseline)
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
@@ -194,6 +195,11 @@ def interpolated(recording: Recording) -> tuple[Recording, list[Remark]]:
     return curve, remarks
 
 
+def _placed(given: Any) -> Any:
+    """Of a recording of velocity alone, the one with the velocity's integral as its position."""
+    return signals.placed(given) if isinstance(given, Recording) else given
+
+
 # What is said of lone samples in other words, as they are left out here.
 SPIKES = "force_spikes"
 
@@ -204,7 +210,10 @@ def inspected(recording: Recording) -> tuple[Recording, list[Remark]]:
     Every check of a recording by itself belongs here: where a remark is severe, nothing is
     searched.
     """
-    remarks = [remark for remark in checks.inspect(recording) if remark.name != SPIKES]
+    recorded = recording
+    if recording.position_every == 0:
+        recorded = dataclasses.replace(recording, position=None)
+    remarks = [remark for remark in checks.inspect(recorded) if remark.name != SPIKES]
     spikes = outliers(recording)
     if not spikes.any():
         return recording, remarks

@@ -32,7 +32,8 @@ class Motion(NamedTuple):
 def motion_of(recording: "Recording | Motion") -> Motion:
     """The motion of a recording by its position, where it has one.
 
-    A recorded velocity is late by its filter, which would look like a delay of the force.
+    A recorded velocity is late by its filter, which would look like a delay of the force. A
+    position that is its integral says nothing else.
     """
     if isinstance(recording, Motion):
         return recording
@@ -41,7 +42,7 @@ def motion_of(recording: "Recording | Motion") -> Motion:
 
 def from_position(recording: Recording) -> Recording:
     """A recording without its velocity, where it has a position to derive one from."""
-    if recording.position is None:
+    if recording.position is None or recording.position_every == 0:
         return recording
     return dataclasses.replace(recording, velocity=None)
 

@@ -51,7 +51,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         unheard = selected.confirmed is None and not effect.momentary
         if findings.problem.held is not None and unheard:
             text += ELSEWHERE
-        if effect.late and evidence.motion.position is None:
+        if effect.late and not evidence.located:
             text += f" {NO_POSITION}"
         result.append(
             Finding(

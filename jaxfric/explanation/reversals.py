@@ -49,7 +49,7 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
     baseline.
     """
     motion = motion_of(recording)
-    if motion.recording.position is None:
+    if motion.recording.position is None or motion.recording.position_every == 0:
         return False
     position = np.asarray(motion.recording.position)
     slopes = np.array(
@@ -110,7 +110,7 @@ def passages(
     """
     motion = motion_of(recording)
     recording, width = motion.recording, evidence.width
-    beyond = recording.position_every - 1
+    beyond = max(recording.position_every, 1) - 1
     count = recording.num_samples
     velocity, segment = np.asarray(motion.padded.velocity)[:count], np.asarray(recording.segment)
     position, force = np.asarray(recording.position), np.asarray(recording.force)

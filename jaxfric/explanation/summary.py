@@ -135,7 +135,7 @@ def _doubts(better: Improved) -> list[Remark]:
     if better.spoilt is not None:
         remark = not_better(better.dropped, better.before, better.spoilt)
         late = any(EFFECTS[name].late for name in better.dropped)
-        if late and evidence.motion.position is None:
+        if late and not evidence.located:
             remark = remark._replace(text=f"{remark.text} {NO_POSITION}")
         remarks.append(remark)
     return remarks

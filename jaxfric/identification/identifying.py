@@ -24,7 +24,7 @@ from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .narrowing import narrowed, reaching
 from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
-from .setup import Setup, all_finite, ready_rows, sanitised, set_up, together
+from .setup import Setup, all_finite, ready_rows, sanitised, set_up, structure, together
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; then the weak form, which needs no closing, is the better choice.
@@ -62,7 +62,8 @@ def identify(
 
     Outside of `jax.jit` the signals and what the model leaves of them are checked too: `warnings`
     and `remarks` of the result, and signals that contradict each other are its `result`. Of more
-    than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so.
+    than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so. A model that
+    reads the position takes the integral of the velocity where none is recorded.
 
     **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, for
     `align` inside `jax.jit`, and, with `throw`, for any other failure.
@@ -75,6 +76,8 @@ def identify(
             "identify outside, or shift the force first."
         )
     given = recording.num_samples
+    if "position" in structure(model).coordinates:
+        recording = signals.placed(recording)
     recording = recording if traced or batch else excerpt(recording)
     rows = [] if traced else ready_rows(recording)
     how = _How(model, projection, bounds, grid, align, given)

@@ -48,7 +48,7 @@ def set_up(
 
     **Raises:** `ValueError` if the model cannot be identified from such a recording.
     """
-    term = _structure(model)
+    term = structure(model)
     _check_arguments(term, projection, bounds, grid)
     if prepared is None:
         prepared = _prepare(recording)
@@ -86,7 +86,11 @@ def _width(projection: AbstractProjection | None, recording: Recording) -> int:
     return sorted(signals.kernel_half_width(one) for one in some)[len(some) // 2]
 
 
-def _structure(model) -> AbstractTerm:
+def structure(model: AbstractTerm | Model | Identified | str) -> AbstractTerm:
+    """The sum of terms of what [`identify`][] is given.
+
+    **Raises:** `ValueError` if that is none.
+    """
     if isinstance(model, str):
         return named(model)
     if isinstance(model, Identified):

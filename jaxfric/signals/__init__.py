@@ -18,6 +18,7 @@ from .comparing import (
     of_acceleration as of_acceleration,
 )
 from .derivatives import derivative as derivative, part_of as part_of
+from .integral import placed as placed
 from .kernels import (
     kernel as kernel,
     kernel_slope as kernel_slope,

@@ -13,7 +13,7 @@ from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model, require as require_model
-from .prediction import Prepared, at_once, forces, later, samples_of
+from .prediction import Prepared, at_once, forces, later, located, samples_of
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
@@ -162,7 +162,7 @@ def _residuals(
 ) -> Iterator[tuple[slice, Float[np.ndarray, " n"]]]:
     """[`residual`][] of samples one after the other, and which these are."""
     require_model(model, "predict")
-    motion = Prepared.of(recording) if prepared is None else prepared
+    motion = Prepared.of(located(model, recording)) if prepared is None else prepared
     force = arrived(model, recording)
     for own, predicted in forces(model, motion):
         measured = force[own]  # without what the motion is padded with
@@ -182,6 +182,7 @@ def force_error(model: Model, recording: Recording) -> float:
     No filter but the derivative in û: the noise of the recorded force is in it. NaN where nothing
     moves or no force is recorded.
     """
+    recording = located(model, recording)
     prepared = Prepared.of(recording)
     moving = in_motion(recording, delay_of(model), prepared)
     parts = _residuals(model, recording, prepared)

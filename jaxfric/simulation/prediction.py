@@ -38,12 +38,21 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
     first order. What a load pushes that is stepped along the motion (`DryCompliance`,
     `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings. NaN where a
-    parameter counts that the model has no value for.
+    parameter counts that the model has no value for. A model that reads the position takes the
+    integral of the velocity, from zero, where no position is recorded.
     """
     require_model(model, "predict")
     require(recording, "predict")
+    recording = located(model, recording)
     first, *others = (force for _, force in forces(model, Prepared(recording)))
     return jnp.asarray(np.concatenate([first, *others]) if others else first)
+
+
+def located(model: Model, recording: Recording) -> Recording:
+    """The recording with a position, if only the integral of its velocity, where the model reads
+    one.
+    """
+    return signals.placed(recording) if "position" in model.term.coordinates else recording
 
 
 class Prepared:
