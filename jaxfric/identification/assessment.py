@@ -42,7 +42,7 @@ def solve(term, beta, recording, rows: Rows, alpha=None):
 
 class InertialForce(NamedTuple):
     """Mass times acceleration at the samples, `force`, N; the `acceleration`, and by how much that
-    is `unsure` at the ends of a stretch in slip, m/s²; all `(N,)`.
+    is `unsure`, m/s²; all `(N,)`.
 
     By Lemma 1 its integral over a closed window with any function of velocity is zero. The sum over
     samples is not, where few of them lie in a bump: a mass that is taken for friction. So beside a
@@ -65,9 +65,10 @@ def inertial_force(recording, limits: Scales, rows: Rows) -> InertialForce:
 
 def _slope_in_slip(recording, limits: Scales) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
     """The acceleration at the samples, m/s², by parabolas through three of one direction each, and
-    what these change of straight lines.
+    what is unsure of it: what the last order changes.
 
-    Where the direction changes friction jumps, and with it the acceleration.
+    Where the direction changes friction jumps, and with it the acceleration. A controller may
+    answer within few samples: beside the ends of the stretches it is by cubics where these differ.
     """
     velocity = recording.velocity
     way = jnp.sign(velocity)
@@ -79,7 +80,54 @@ def _slope_in_slip(recording, limits: Scales) -> tuple[Float[Array, " N"], Float
     last = before & ~after & jnp.roll(before, 1)
     inside = jnp.where(first, jnp.roll(slope, -1), jnp.roll(slope, 1))
     rough = jnp.where(first | last, slope - inside, 0.0)
-    return slope + rough, rough
+    more, known = _by_cubics(velocity, alike, first, last)
+    more, bends = more / limits.interval, _surely(more * way, known, ~before, ~after)
+    return slope + rough + jnp.where(bends, more, 0.0), jnp.where(bends, more, rough)
+
+
+def _by_cubics(velocity, alike, first, last):
+    """What cubics through four samples of one direction change of the parabolas' differences from
+    sample to sample, m/s, `(N,)`; and where there are four.
+    """
+    known = alike[2:] & alike[1:-1] & alike[:-2]
+    third = jnp.where(known, jnp.diff(velocity, n=3), 0.0)
+
+    def from_(before: int):
+        """Those that begin so many samples before each sample, and whether there are any."""
+        sides = (before, 3 - before)
+        return jnp.pad(third, sides), jnp.pad(known, sides)
+
+    (earlier, one), (later, other) = from_(2), from_(1)
+    both = jnp.maximum(one.astype(third.dtype) + other.astype(third.dtype), 1)
+    (begun, starts), (ended, ends) = from_(0), from_(3)
+    inner = -(earlier + later) / (6 * both)
+    more = jnp.where(first, begun / 3, jnp.where(last, ended / 3, inner))
+    return more, jnp.where(first, starts, jnp.where(last, ends, one | other))
+
+
+# Samples from either end of a stretch that may be by cubics: an answer that takes longer is sampled
+# well. Three standard errors of a mean over so many stretches at least.
+BESIDE, SURE, FEWEST = 8, 3.0, 8
+
+
+def _surely(more, known, begins, ends):
+    """Where `more` is no noise: samples so far from the ends of the stretches at which its mean
+    over all stretches is surely not zero, `(N,)`. Chosen sample by sample it would be noise.
+    """
+    index = jnp.arange(more.size)
+    begun = index - jax.lax.cummax(jnp.where(begins, index, 0))
+    left = jax.lax.cummin(jnp.where(ends, index, more.size - 1), reverse=True) - index
+
+    def beside(apart):
+        here = (apart[None, :] == jnp.arange(BESIDE)[:, None]) & known[None, :]
+        count = jnp.maximum(jnp.sum(here, axis=1), 1).astype(more.dtype)
+        mean = jnp.sum(jnp.where(here, more[None, :], 0.0), axis=1) / count
+        apart_from = jnp.where(here, more[None, :] - mean[:, None], 0.0)
+        error = jnp.sqrt(jnp.sum(apart_from**2, axis=1)) / count
+        sure = (jnp.abs(mean) > SURE * error) & (count >= FEWEST)
+        return jnp.any(here & sure[:, None], axis=0)
+
+    return beside(begun) | beside(left)
 
 
 class Solved(NamedTuple):
