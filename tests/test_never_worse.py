@@ -64,7 +64,11 @@ def test_the_figures_are_those_of_the_saved_model_and_a_subtraction(healthy):
     document = json.loads(json.dumps(found.to_dict()))
     saved = models.Model.from_dict(document["model"])
     errors, there = (document["fit"][key] for key in ("force_error", "holdout_force_error"))
-    assert document["fit"]["holdout_adjusted"] == {"left_out": [], "rephased": []}
+    assert document["fit"]["holdout_adjusted"] == {
+        "left_out": [],
+        "rephased": [],
+        "changed_before": [],
+    }
     for model, when in ((found.baseline, "before"), (saved, "after")):
         assert by_hand(model, run) == pytest.approx(errors[when], rel=1e-9)
         assert by_hand(model, held) == pytest.approx(there[when], rel=1e-9)
@@ -556,3 +560,26 @@ def test_what_goes_is_what_makes_the_model_worse_and_not_what_explains_most(
     figures = types.SimpleNamespace(rounding=1e-8)
     found = improvement.improved(None, Reported("abc", wrong), figures)
     assert found.findings.names == left and set(found.dropped) == set("abc") - set(left)
+
+
+def after_a_change(moment: float, seed: int) -> Recording:
+    """An axis whose constant force changes by 2 N at a moment, s."""
+    time = np.arange(5000) / 250
+    rate = 2 * np.pi * 0.4
+    velocity = 0.2 * rate * np.cos(rate * time + seed) + 0.1 * np.cos(2.3 * rate * time)
+    position = np.cumsum(velocity) / 250
+    force = 3 * np.gradient(velocity, time) + 4 * np.sign(velocity) + 5 * velocity
+    force += 2.0 * (time > moment) + np.random.default_rng(seed).normal(0, 0.02, time.size)
+    return Recording(time=time, force=force, position=position, velocity=velocity)
+
+
+def test_a_recording_made_after_a_change_confirms_it():
+    found = explain(after_a_change(9.0, 1), holdout=after_a_change(-1.0, 2))
+    never_worse(found)
+    assert found.verdict == "explained"
+    (step,) = found.findings
+    value = next(v for n, v in step.parameters.items() if n.endswith(("offset", "constant")))
+    assert float(value.value) == pytest.approx(2.0, rel=0.01)
+    held = found.fit["holdout_force_error"]
+    assert held["after"] < 0.2 * held["before"]
+    assert found.fit["holdout_adjusted"]["changed_before"] == [step.effect]

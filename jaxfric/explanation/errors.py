@@ -115,18 +115,22 @@ def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:
 
 
 def _adjusted(findings: Findings) -> dict[str, list[str]]:
-    """Findings that the held-out figures take at another phase, or leave out."""
+    """Findings that the held-out figures take at another phase, as changed before, or leave out."""
     problem, selection = findings.undelayed
     there = verification.carried(selection.last, problem.held, selection.rephased)
-    adjusted: dict[str, list[str]] = {"left_out": [], "rephased": []}
-    known = {id(term): alpha for term, alpha in zip(there.terms, there.alphas, strict=True)}
+    adjusted: dict[str, list[str]] = {"left_out": [], "rephased": [], "changed_before": []}
+    known = {
+        id(term): own for term, *own in zip(there.terms, there.alphas, there.betas, strict=True)
+    }
     for number, selected in enumerate(selection.selected):
         index = selection.term_index(number)
-        term, alpha = selection.last.terms[index], selection.last.alphas[index]
+        term, last = selection.last.terms[index], selection.last
         if id(term) not in known:
             adjusted["left_out"].append(selected.effect.name)
-        elif not np.array_equal(known[id(term)], alpha):
+        elif not np.array_equal(known[id(term)][0], last.alphas[index]):
             adjusted["rephased"].append(selected.effect.name)
+        elif not np.array_equal(known[id(term)][1], last.betas[index]):
+            adjusted["changed_before"].append(selected.effect.name)
     return adjusted
 
 

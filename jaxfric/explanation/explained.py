@@ -38,7 +38,8 @@ class Explanation:
     - `warnings`: what makes the answer doubtful, each with `name`, `text` and whether it is
       `severe`: then what would be said beside it is certain to be wrong.
     - `holdout_model`: the model as it stands on the held-out recording: `model`, but for waves at
-      their phase there and without what belongs to a moment (`fit["holdout_adjusted"]` says which).
+      their phase there, without what belongs to a moment, and as after a change that was before
+      it (`fit["holdout_adjusted"]` says which).
     - `sanity`: what was looked at before any physics where the baseline is a simulator, a row each
       with `check`, whether it is `wrong`, `value` and `text`.
 

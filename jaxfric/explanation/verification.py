@@ -91,22 +91,47 @@ def carried(current: Fit, evidence: Evidence, rephased: frozenset[int] = frozens
     it holds is still of the recording that it was fitted to.
     """
     ways = _ways(current, evidence, rephased)
-    _, alphas, skipped = min(ways, key=lambda way: float(way[0] @ way[0]))
-    other = current._replace(alphas=tuple(alphas))
+    _, other, skipped = min(ways, key=lambda way: float(way[0] @ way[0]))
     return (
         other.only([i for i in range(len(current.terms)) if i not in skipped]) if skipped else other
     )
 
 
+def changed_before(current: Fit, evidence: Evidence) -> Fit | None:
+    """A fit whose changes at a moment are over when another recording begins; `None` without any.
+
+    What has been picked up, or has worn, may still be so in a recording of later.
+    """
+    dates = [traits(term).moment if i else "" for i, term in enumerate(current.terms)]
+    if not any(dates):
+        return None
+    before = evidence.limits.start - 4 * evidence.limits.duration
+    betas = list(current.betas)
+    for i, (term, date) in enumerate(zip(current.terms, dates, strict=True)):
+        own = np.array([p.name == date for p in term.nonlinear], bool)
+        betas[i] = np.where(own, before, betas[i]) if date else betas[i]
+    return current._replace(betas=tuple(betas))
+
+
 def _ways(current: Fit, evidence: Evidence, rephased: frozenset[int]):
-    """Residual, affine parameters and terms left out, for each way in which moments may return."""
+    """Residual, fit there and terms left out, for each way in which moments may return."""
     moments = frozenset(i for i, t in enumerate(current.terms) if i and traits(t).momentary)
-    ways = [(rephased, frozenset[int]())]
+    ways = [(current, rephased, frozenset[int]())]
     if moments:
-        ways.append((rephased, moments))
+        ways.append((current, rephased, moments))
     if tones := _tones(current):
-        ways.append((rephased | tones, moments - tones))
-    return [(*_there(current, evidence, anew, skipped), skipped) for anew, skipped in ways]
+        ways.append((current, rephased | tones, moments - tones))
+    if (later := changed_before(current, evidence)) is not None:
+        ways.append((later, rephased, frozenset(i for i in moments if not _is_dated(current, i))))
+    found = []
+    for some, anew, skipped in ways:
+        rest, alphas = _there(some, evidence, anew, skipped)
+        found.append((rest, some._replace(alphas=tuple(alphas)), skipped))
+    return found
+
+
+def _is_dated(current: Fit, number: int) -> bool:
+    return bool(traits(current.terms[number]).moment)
 
 
 def lacking(selection: Selection, evidence: Evidence, number: int) -> Fit:
@@ -156,10 +181,10 @@ def residuals(
         for current in (less, more)
     ]
 
-    def pair(skipped, anew) -> tuple[np.ndarray, np.ndarray]:
+    def pair(skipped, anew, fits=(less, more)) -> tuple[np.ndarray, np.ndarray]:
         return (
-            residual(less, rows[0], others | anew[0], skipped[0]),
-            residual(more, rows[1], rephased | anew[1], skipped[1]),
+            residual(fits[0], rows[0], others | anew[0], skipped[0]),
+            residual(fits[1], rows[1], rephased | anew[1], skipped[1]),
         )
 
     none = [frozenset[int]()] * 2
@@ -170,7 +195,15 @@ def residuals(
     if tones[1]:
         others_idle = [same - own for same, own in zip(idle, tones, strict=True)]
         ways.append((others_idle, tones))
-    return min((pair(*way) for way in ways), key=lambda both: both[1] @ both[1])
+    pairs = [pair(*way) for way in ways]
+    dated = [
+        frozenset(i for i in same if _is_dated(current, i))
+        for current, same in zip((less, more), idle, strict=True)
+    ]
+    if dated[1] and len(dated[0]) == len(dated[1]):
+        later = [changed_before(current, rows[0]) for current in (less, more)]
+        pairs.append(pair([same - own for same, own in zip(idle, dated, strict=True)], none, later))
+    return min(pairs, key=lambda both: both[1] @ both[1])
 
 
 def _tones(current: Fit) -> frozenset[int]:

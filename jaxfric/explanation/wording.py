@@ -106,12 +106,19 @@ def _by_sample(fit: Mapping[str, Any], verdict: str) -> str:
     return f" Sample by sample most of it is {what}: {filtered:.2%} is left through a filter."
 
 
+_ADJUSTED = (
+    ("rephased", "at another phase"),
+    ("changed_before", "as after the change"),
+    ("left_out", "left out"),
+)
+
+
 def adjusted(fit: Mapping[str, Any]) -> str:
     """Which findings the held-out figures take otherwise than the saved model has them."""
     adjusted = fit.get("holdout_adjusted") or {}
     parts = [
         f"{' and '.join(name.replace('_', ' ') for name in adjusted[key])} {how}"
-        for key, how in (("rephased", "at another phase"), ("left_out", "left out"))
+        for key, how in _ADJUSTED
         if adjusted.get(key)
     ]
     return f" ({', '.join(parts)})" * bool(parts)

@@ -49,7 +49,11 @@ def definitions(fit: Mapping[str, Any]) -> str:
                 f"{_percent(error.get('before'))} before and {_percent(error.get('after'))} after."
             )
     adjusted = fit.get("holdout_adjusted") or {}
-    for key, how in (("left_out", "left out"), ("rephased", "taken at its own phase")):
+    for key, how in (
+        ("left_out", "left out"),
+        ("rephased", "taken at its own phase"),
+        ("changed_before", "taken as after its change"),
+    ):
         if names := adjusted.get(key):
             text += f" On the held-out recording {', '.join(map(spoken, names))} is {how}."
     return text
