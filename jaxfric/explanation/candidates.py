@@ -12,7 +12,7 @@ from ..data.recording import Recording
 from ..terms import KNOWN_FORCE
 from ..terms.actuator import REACTION
 from ..terms.base import AbstractTerm, leaves
-from ..terms.effect import Effect, View, inside
+from ..terms.effect import REPEATED, Effect, View, inside
 from ..terms.effects import EFFECTS
 from ..units import TURNS
 from .evidence import Evidence
@@ -183,6 +183,13 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         have.add("position")
     turn = TURNS.get(dict(evidence.motion.units).get("position", ""))
     turn = turn if "position" in have else None
+    stroke = float(evidence.limits.high - evidence.limits.low)
+
+    def shows(term: AbstractTerm) -> bool:
+        """Whether a wave of a given period repeats within the stroke: else it is a spring."""
+        low, high = (0.0, 0.0) if term.nonlinear else term.extent({}).get("position", (0.0, 0.0))
+        return REPEATED * (high - low) <= stroke
+
     found: list[Candidate] = []
     for effect in EFFECTS.values():
         if effect.needs - have or (effect.momentary and not evidence.clock):
@@ -190,7 +197,7 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         for term in effect.shapes(seen.limits):
             if term.coordinates & CHANNELS - have:
                 continue
-            for suited in effect.suited(term, base, turn):
+            for suited in filter(shows, effect.suited(term, base, turn)):
                 found += _placed(effect, suited, evidence, seen)
     present = {type(t) for t in leaves(base)}
     return [c for c in found if not (set(map(type, leaves(c.term))) <= present)]

@@ -74,5 +74,8 @@ class Gravity(AbstractLaw):
     def law(self, sample: Sample):
         return waves(2 * jnp.pi * sample.position / self.turn)
 
+    def extent(self, values):
+        return {"position": (0.0, self.turn)}
+
     def text(self, s):
         return s.waves("x", literal(self.turn))

@@ -1,14 +1,15 @@
 """An eccentric mass on a turning axis."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
-from ..base import AbstractLaw
-from ..effect import REPEATED, Effect, slowly
-from ..position import POSITION_ONLY, stroke, wave, waves
+from ..base import AbstractLaw, AbstractTerm
+from ..effect import REPEATED, Effect, Extent, slowly
+from ..position import POSITION_ONLY, Gravity, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
 
 
@@ -46,6 +47,28 @@ class GravityUnbalance(AbstractLaw):
         return s.waves("x", period)
 
 
+def _once_a_turn(
+    term: GravityUnbalance, base: AbstractTerm, turn: float | None
+) -> tuple[AbstractTerm, ...]:
+    """On a turning axis also the weight whose period is one revolution."""
+    return (term,) if turn is None else (term, Gravity(turn))
+
+
+def _told(values: Mapping[str, float], extent: Extent) -> str | None:
+    if "unbalance_period" not in values:
+        return (
+            "A force that repeats once per revolution, amplitude {amplitude}: gravity on an "
+            "eccentric mass, or the run-out of a gear"
+        )
+    return _slowly(values, extent)
+
+
+_slowly = slowly(
+    "unbalance_period",
+    "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the "
+    "stroke, so that a spring or a cable would look the same",
+)
+
 GRAVITY_UNBALANCE = Effect(
     "gravity_unbalance",
     "A sin(2πx/L + φ)",
@@ -57,9 +80,6 @@ GRAVITY_UNBALANCE = Effect(
     needs=frozenset({"position"}),
     confusable_with=("spring", "hardening_spring", "cogging"),
     separate_by="Use the whole stroke: an unbalance is periodic, a spring is not.",
-    variant=slowly(
-        "unbalance_period",
-        "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the "
-        "stroke, so that a spring or a cable would look the same",
-    ),
+    suited=_once_a_turn,
+    variant=_told,
 )
