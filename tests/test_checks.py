@@ -376,6 +376,7 @@ def hidden(force):
 def test_what_repeats_with_the_place_may_hide_a_parameter_and_noise_does_not(seed):
     draw = np.random.default_rng(seed)
     assert hidden(lambda x, v: 1.0 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
+    assert hidden(lambda x, v: 0.4 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.05 * np.sin(9 * x) + 0.05 * draw.normal(size=len(x)))
     assert not hidden(lambda x, v: 0.6 * draw.normal(size=len(x)))
 

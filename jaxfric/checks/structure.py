@@ -22,8 +22,8 @@ def hides(
     """Whether what is left may be a good part of a parameter.
 
     It is a function of position and velocity, in half of its power at least: physics that the model
-    lacks, no noise. And it is as large as what the parameter adds to what all others explain: the
-    bias of a parameter is the part of the missing force along that column.
+    lacks, no noise. And it is half as large at least as what the parameter adds to what all others
+    explain: the bias of a parameter is the part of the missing force along that column.
 
     **Arguments:** `design`, J rows, the first p columns those of the parameters `alpha`, `(p,)`;
     `time`, s, `position`, m, or none, and `mask`, `(N,)`; `sure`, numbers of the parameters that
@@ -45,7 +45,7 @@ def hides(
     own = 1 / np.sqrt(np.maximum(np.diag(np.linalg.pinv(basis.T @ basis)), 1.0))
     least = np.min(np.abs(alpha[sure]) * (size * own)[sure])
     return bool(
-        np.linalg.norm(left) > least
+        np.linalg.norm(left) > HALF * least
         and repeats(left, _state(design.time[rows], time[mask], position[mask])) > HALF
     )
 
