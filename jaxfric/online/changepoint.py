@@ -62,13 +62,14 @@ def split(
     # A step that the speed makes as well is none.
     usable = told > ROUNDING * size
     gained = np.where(usable, steps**2 / np.where(usable, told, 1.0), 0.0)
-    freedom = count - 3
-    remains = np.maximum(float(level @ level) - gained, least)
     if not least > 0:
         return None
-    scores = normal(freedom * gained / remains, freedom, np)
-    best = int(np.argmax(scores))
-    if not len(before) * math.erfc(float(scores[best]) / math.sqrt(2)) < rate:
+    freedom = count - 3
+    remains = np.maximum(float(level @ level) - gained, least)
+    ratio = gained / remains
+    best = int(np.argmax(ratio))
+    score = float(normal(freedom * float(ratio[best]), freedom, np))
+    if not len(before) * math.erfc(score / math.sqrt(2)) < rate:
         return None
     at = int(before[best])
     return Split(count - at, float(steps[best] / told[best]), float(np.mean(force[:at])))

@@ -205,10 +205,8 @@ static int @NAME@_split(const @NAME@_recent *r, double *shift, double *before)
     const double slope = varied ? both / spread : 0.0;
     double square = 0.0, step = 0.0, alike = 0.0, best = -1.0;
     int after = 0;
-    for (int k = 0; k < n; k++) {
-        const double level = r->force[k] - force - slope * (r->speed[k] - speed);
-        square += level * level;
-    }
+    for (int k = 0; k < n; k++)
+        square += pow(r->force[k] - force - slope * (r->speed[k] - speed), 2.0);
     for (int k = n - 1; k >= @NAME@_FEWEST; k--) {
         const double size = (double)k * (n - k) / n, off = r->speed[k] - speed;
         step += r->force[k] - force - slope * off;
@@ -216,11 +214,13 @@ static int @NAME@_split(const @NAME@_recent *r, double *shift, double *before)
         const double told = varied ? size - alike * alike / spread : size;
         if (n - k < @NAME@_FEWEST || !(told > @NAME@_rounding * size)) continue;
         const double gained = step * step / told, left = fmax(square - gained, n * least * least);
-        const double score = left > 0.0 ? @NAME@_normal((n - 3) * gained / left, n - 3) : 0.0;
-        if (score > best) best = score, after = n - k, *shift = step / told;
+        const double ratio = left > 0.0 ? gained / left : 0.0;
+        if (ratio > best) best = ratio, after = n - k, *shift = step / told;
     }
     const int moments = n - 2 * @NAME@_FEWEST + 1;
-    if (!after || !(moments * erfc(best / sqrt(2.0)) < @NAME@_rate)) return 0;
+    if (!after) return 0;
+    const double score = @NAME@_normal((n - 3) * best, n - 3);
+    if (!(moments * erfc(score / sqrt(2.0)) < @NAME@_rate)) return 0;
     *before = 0.0;
     for (int k = 0; k < n - after; k++) *before += r->force[k] / (n - after);
     return after;
@@ -233,8 +233,7 @@ static void @NAME@_append(@NAME@_recent *r, double speed, double force)
         memmove(r->force, r->force + 1, (@NAME@_SPAN - 1) * sizeof *r->force);
         r->count--;
     }
-    r->speed[r->count] = speed;
-    r->force[r->count++] = force;
+    r->speed[r->count] = speed, r->force[r->count++] = force;
 }
 
 /* Whether a stroke is faster than any that the reference was identified for. */

@@ -270,7 +270,8 @@ class Follower:
         for values, new in zip(total, stroke, strict=True):
             values[side] = kept * values[side] + new
         for groups, new in zip(self._groups, stroke, strict=True):
-            groups[:, side] *= kept
+            if kept != 1:
+                groups[:, side] *= kept
             groups[group, side] += new
 
     def _chart(self, side: int, time: float, excess: float, before: float) -> Change | None:
