@@ -81,39 +81,44 @@ def log_of(seconds, **how):
 @given(
     speeds=st.lists(st.floats(1e-3, 3.9), min_size=1, max_size=20),
     nodes=st.integers(4, 33),
-    reach=st.floats(2e-3, 1.9),
+    wider=st.floats(1.0, 30.0),
 )
 @settings(max_examples=30, deadline=None)
-def test_a_wider_grid_holds_what_the_samples_would_have_made_there(speeds, nodes, reach):
-    """The law that lets nodes widen: sums moved to every second node lose nothing against it."""
-    narrow = np.geomspace(1e-3, reach, nodes)
-    wide = 1e-3 * (narrow / 1e-3) ** 2
-    inside = np.minimum(speeds, reach)
-
-    before, after = (np.array([_hat(at, k, inside) for k in range(nodes)]) for at in (narrow, wide))
-    ratio = narrow[1] / narrow[0]
-    np.testing.assert_allclose(moments.merged(before, ratio, np), after, atol=1e-9)
-
-
-def _hat(nodes, k, speeds):
-    """The share of node `k` in speeds, summed."""
-    return np.sum(np.interp(speeds, nodes, np.eye(len(nodes))[k]))
+def test_wider_nodes_keep_the_time_and_the_mean_speed(speeds, nodes, wider):
+    narrow = np.geomspace(1e-3, 4.0, nodes)
+    wide = np.geomspace(1e-3, 4.0 * wider, nodes)
+    before = np.sum(moments.hats(narrow, np.array(speeds)), axis=0)
+    after = before @ moments.hats(wide, narrow)
+    assert np.sum(after) == pytest.approx(len(speeds)) and np.all(after >= 0)
+    assert after @ wide == pytest.approx(np.sum(speeds))
+    state = online.start(1e-3, 4.0, nodes=nodes)
+    sums = jnp.stack([jnp.asarray(before)] * 2)
+    moved = moments.wider(
+        state._replace(total=moments.Sums(sums, sums, jnp.zeros(2))), jnp.asarray(2.0 * wider)
+    )
+    np.testing.assert_allclose(moved.nodes, wide, rtol=1e-9)
+    np.testing.assert_allclose(moved.total.weight[0], after, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("how", [{}, {"keep": 5.0}, {"window": 4}])
 def test_faster_samples_widen_the_nodes(how):
-    """Nothing of what was gathered is lost, and the object does what the scan does."""
-    values = samples(20).at[:3000, 1:].multiply(0.02)  # slow at first
+    """Little of what was gathered is lost, and the object does what the scan does."""
+    values = np.array(samples(20))
+    values[:3000, 1] *= 0.02  # slow at first
+    values[:, 2] = 20 * np.sign(values[:, 1]) + 60 * values[:, 1]
+    values = jnp.asarray(values)
     narrow, _ = run(online.start(1e-3, 0.006, **how), values)
-    wide, _ = run(online.start(1e-3, 1.296, **how), values)
+    wide, _ = run(online.start(1e-3, 0.3, **how), values)
     follower = online.Follower("coulomb-viscous", slowest=1e-3, fastest=0.006, **how)
     for row in np.asarray(values).tolist():
         follower.add(*row)
-    assert follower.fastest == pytest.approx(1.296)  # 6, 36, 1296 times the slowest
-    for one in (narrow, follower.state()):
-        np.testing.assert_allclose(one.nodes, wide.nodes, rtol=1e-9)
-        for ours, theirs in zip(one.total, wide.total, strict=True):
-            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+    for ours, theirs in zip(follower.state().total, narrow.total, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
+    fastest = float(jnp.max(jnp.abs(values[:, 1])))
+    assert fastest < follower.fastest < moments.ABOVE * fastest
+    found, wanted = (online.solve(follower.term, each).model.parameters for each in (narrow, wide))
+    for name, value in wanted.items():
+        assert float(found[name]) == pytest.approx(float(value), rel=1e-2), name
     assert not np.isfinite(narrow.reference).any()
 
 
@@ -268,7 +273,7 @@ def test_watch_says_when_the_axis_moves_faster_than_at_first(tmp_path, capsys, m
     assert main(["watch", str(path), "--once", "--json"]) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     faster = [d for d in told if d["event"] == "faster"]
-    assert len(faster) == 1 and 10 < faster[0]["time"] < 10.2 and faster[0]["fastest"] > 0.2
+    assert len(faster) == 1 and 10 < faster[0]["time"] < 11 and faster[0]["fastest"] > 0.2
     last = told[-1]["parameters"]
     assert last["coulomb+"] == pytest.approx(6, rel=1e-2)
     assert last["viscous-"] == pytest.approx(40, rel=1e-2)

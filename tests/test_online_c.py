@@ -30,7 +30,7 @@ class Follower:
         flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-O2"]
         command = [COMPILER, *flags, "-shared", "-fPIC", "-o", library, source, "-lm"]
         subprocess.run(command, check=True)
-        self._c, self._state = ctypes.CDLL(library), ctypes.create_string_buffer(80 * NODES + 4096)
+        self._c, self._state = ctypes.CDLL(library), ctypes.create_string_buffer(80 * NODES + 8192)
         self._c.axis_start(self._state)
 
     def add(self, *sample):

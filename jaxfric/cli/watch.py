@@ -9,7 +9,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from .. import checks
 from ..data.io import write_text
+from ..identification.identified import Result
+from ..identification.uncertainty import Estimate
 from ..online import Change, Follower, c_source, feed
 from ..units import spell
 from .messages import say
@@ -32,7 +35,7 @@ def run(arguments: Namespace) -> int:
 def _follow(lines, source: str, arguments: Namespace) -> int:
     stream = feed.Feed(lines, arguments.columns, arguments.scale, arguments.units, source)
     samples = iter(stream)
-    start = feed.begin(samples, stream.has_velocity, source)
+    start = feed.begin(samples, stream.has_velocity, source, stream.units)
     if arguments.c:
         return _generated(start, source, arguments)
     follower = Follower(
@@ -45,6 +48,8 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
     )
     told = _Told(follower, stream.units, arguments.json_lines)
     told.begin(start, stream, source)
+    for remark in start.remarks:
+        told.remark(*remark)
     moving: Iterator[feed.Moving] = itertools.chain(
         start.samples, feed.rest(samples, start.derivative)
     )
@@ -52,14 +57,17 @@ def _follow(lines, source: str, arguments: Namespace) -> int:
     for sample in moving:
         last = sample.time
         change = follower.add(*sample)
-        told.speeds(last)
+        told.speeds(last, sample.velocity)
         if change:
             told.change(change)
         if following == -math.inf:
             following = sample.time + arguments.every
         if sample.time >= following:
+            told.clock(sample.time, stream.clock)
             told.parameters(sample.time)
             following = sample.time + arguments.every
+    told.speeds(last, 0.0)
+    told.clock(last, stream.clock)
     told.parameters(last)
     if arguments.once:
         told.end(source)
@@ -82,11 +90,17 @@ def _generated(start: feed.Start, source: str, arguments: Namespace) -> int:
     return 0
 
 
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
 class _Told:
     """What is printed: lines for a person, or one JSON document a line."""
 
     def __init__(self, follower: Follower, units: dict[str, str], plain: bool):
         self._follower, self._json, self._fastest = follower, plain, follower.fastest
+        self._remarked: set[str] = set()
+        self._from: tuple[int, int] | None = None
         self._units = {"force": "N", "position": "m"} | units
         term = follower.term
         self._spelled = {
@@ -120,16 +134,40 @@ class _Told:
             f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.fastest:.3g} {speed}",
         )
 
-    def speeds(self, time: float) -> None:
-        """That the axis moves faster than it did at first, once for each widening of the nodes."""
+    def speeds(self, time: float, velocity: float) -> None:
+        """That the axis moves faster than it did at first, once it is slower again."""
         fastest = self._follower.fastest
-        if fastest == self._fastest:
+        if fastest == self._fastest or not abs(velocity) <= self._fastest:
             return
         self._fastest = fastest
         self._put(
             {"event": "faster", "time": time, "fastest": fastest},
             f"{time:10.3f} s  faster than before: speeds up to {fastest:.3g} "
-            f"{self._units['position']}/s are told apart now, and changes are compared anew",
+            f"{self._units['position']}/s are told apart now",
+        )
+
+    def clock(self, time: float, clock: feed.Clock) -> None:
+        """Where the clock did not go forward, the first place since this was last called."""
+        if (first := clock.told()) is None:
+            return
+        row, before, after = first
+        document = {"event": "clock", "time": time, "row": row, "from": before, "to": after,
+                    "steps": clock.stalled}  # fmt: skip
+        self._put(
+            document,
+            f"{time:10.3f} s  row {row}: the clock goes from {before:.6g} to {after:.6g} s; "
+            f"{clock.stalled} such steps so far, at each of which a stroke is left out",
+        )
+
+    def remark(self, name: str, text: str, severe: bool, time: float | None = None) -> None:
+        """A fault of the columns or of what they give, once."""
+        if name in self._remarked:
+            return
+        self._remarked.add(name)
+        when = "" if time is None else f"{time:10.3f} s  "
+        self._put(
+            {"event": "remark", "time": time, "name": name, "severe": severe, "text": text},
+            f"{when}Warning: {text}",
         )
 
     def parameters(self, time: float) -> None:
@@ -138,22 +176,52 @@ class _Told:
             text = f"{time:10.3f} s  no whole stroke in both directions yet"
             self._put({"event": "waiting", "time": time}, text)
             return
-        found = self._follower.solution()
-        values = {name: float(v) for name, v in found.model.parameters.items()}
-        shown = "  ".join(f"{n} {v:.5g} {self._spelled[n]}" for n, v in values.items())
+        found, known = self._follower.solution(), self._follower.assess()
+        shown = "  ".join(self._parameter(n, e) for n, e in known.parameters.items())
         document = {
             "event": "parameters",
             "time": time,
             "strokes": [forward, backward],
             "settled": bool(np.asarray(found.settled)),
-            "parameters": values,
+            "parameters": {n: float(e.value) for n, e in known.parameters.items()},
+            "standard_errors": {
+                n: _finite(float(e.standard_error)) for n, e in known.parameters.items()
+            },
+            "learning": self._follower.learning,
+            "changes_from": list(self._follower.changes_from),
         }
-        self._put(document, f"{time:10.3f} s  {forward}+{backward} strokes  {shown}")
+        text = f"{time:10.3f} s  {forward}+{backward} strokes  {shown}"
+        self._put(document, text + self._learning())
+        for remark in checks.remarks(checks.places(known.faults), self._units):
+            self.remark(remark.name, remark.text, remark.severe, time)
+        if not known.passive:
+            text = str(Result[Result.not_passive])
+            self.remark("not_passive", text, True, time)
+
+    def _parameter(self, name: str, found: Estimate) -> str:
+        """A value with half its 95 % interval, or that it is not known yet."""
+        half = float(found.half_width())
+        if not math.isfinite(half):
+            return f"{name} not known yet"
+        return f"{name} {float(found.value):.5g} ± {half:.2g} {self._spelled[name]}"
+
+    def _learning(self) -> str:
+        """From when on changes are told, where that is new."""
+        before, self._from = self._from, self._follower.changes_from
+        if not self._follower.learning or before == self._from:
+            return ""
+        large, small = self._from
+        return (
+            f"\n              learning: large changes are told from stroke {large} of a direction "
+            f"on, small ones from stroke {small} on"
+        )
 
     def end(self, source: str) -> None:
-        """Where the intervals are, which need more than the sums that a stream leaves."""
+        """What finds more than the sums that a stream leaves."""
         if not self._json:
-            say(f"Intervals and checks of a whole log: jaxfric identify {source}")
+            say(
+                f"± is half the 95 % interval. All checks of a whole log: jaxfric identify {source}"
+            )
 
     def change(self, change: Change) -> None:
         way = "forward" if change.direction > 0 else "backward"
@@ -165,3 +233,4 @@ class _Told:
             f"{change.time:10.3f} s  CHANGE: {size} {more} friction {way}, for "
             f"{change.strokes} strokes; identifying anew",
         )
+        self._from = None

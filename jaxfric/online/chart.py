@@ -17,6 +17,8 @@ from jaxtyping import Array, Bool, Float
 SLACK = 0.5
 # Values that only feed mean and deviation: with fewer degrees of freedom the scores say little.
 LEARNING = 8
+# Strokes of a direction from which the curve is identified that the values are compared with.
+SETTLED = 8
 
 
 class Chart(NamedTuple):
@@ -78,14 +80,21 @@ def _add(chart: Chart, value, height, numpy):
 
 
 def _score(count, mean, square, value, numpy):
-    """The standard normal score of a value, by Student's t of the values before it (Wallace 1959).
+    """The standard normal score of a value, by Student's t of the values before it.
 
-    T = √(n/(n+1)) (x − mean)/s has n − 1 degrees ν; z = (8ν+1)/(8ν+3) √(ν ln(1 + T²/ν)).
+    T = √(n/(n+1)) (x − mean)/s has n − 1 degrees of freedom.
     """
     freedom = numpy.maximum(count - 1, 1.0)
     variance = square / freedom
     safe = numpy.where(variance > 0, variance, 1.0)
-    ratio = count / (count + 1) * (value - mean) ** 2 / safe
-    size = (8 * freedom + 1) / (8 * freedom + 3)
-    size = size * numpy.sqrt(freedom * numpy.log1p(ratio / freedom))
+    size = normal(count / (count + 1) * (value - mean) ** 2 / safe, freedom, numpy)
     return numpy.where(variance > 0, numpy.sign(value - mean) * size, 0.0)
+
+
+def normal(square, freedom, numpy):
+    """The magnitude of the standard normal as improbable as a Student's t (Wallace 1959).
+
+    z = (8ν+1)/(8ν+3) √(ν ln(1 + T²/ν)) of T² `square`, ν `freedom`.
+    """
+    size = (8 * freedom + 1) / (8 * freedom + 3)
+    return size * numpy.sqrt(freedom * numpy.log1p(square / freedom))

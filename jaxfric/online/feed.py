@@ -8,17 +8,16 @@ from typing import NamedTuple, TextIO
 
 import numpy as np
 
-from .. import signals
+from .. import checks, signals
 from ..data import columns as names
 from ..data.per_second import per_second
 from ..data.recording import Recording
+from .moments import ABOVE
 
 # Samples that tell the noise, the fastest motion and so the slowest slip.
 HEAD = 2000
 # Fewer say nothing of a motion.
 LEAST = 100
-# The head need not hold the fastest motion; speeds beyond widen the nodes, twice as coarse.
-ABOVE = 2.0
 # Between two looks at a file that grows, s.
 LOOK = 0.2
 
@@ -57,6 +56,50 @@ def growing(file: TextIO, once: bool) -> Iterator[str]:
             clock.sleep(LOOK)
 
 
+class Clock:
+    """Steps of a stream's clock that do not go forward.
+
+    `stalled`, how many in all; `first`, the row and the times, s, of the first one since
+    [`Clock.told`][].
+    """
+
+    def __init__(self, source: str):
+        self._source, self._last = source, float("nan")
+        self._steps, self._wrong, self._row = 0, 0, 0
+        self.stalled = 0
+        self.first: tuple[int, float, float] | None = None
+
+    def add(self, row: int, time: float) -> None:
+        """The time of a row; raises `ValueError` as [`check`][] does after each [`HEAD`][] rows."""
+        last, self._last = self._last, time
+        if not np.isfinite(time - last):
+            return
+        self._steps += 1
+        if time <= last:
+            self._row = row if self._wrong == 0 else self._row
+            self._wrong += 1
+            self.stalled += 1
+            self.first = self.first or (row, last, time)
+        if self._steps == HEAD:
+            self.check()
+            self._steps = self._wrong = 0
+
+    def check(self) -> None:
+        """Raises `ValueError` unless most stamps are later than the one before."""
+        if self._steps and not self._wrong <= 0.5 * self._steps:
+            raise ValueError(
+                f"{self._source}: row {self._row}: time does not increase, here and at "
+                f"{self._wrong - 1} of the next {self._steps - 1} steps, so most samples have no "
+                "time of their own. Give another column: --columns time=NAME, or log the time with "
+                "more digits."
+            )
+
+    def told(self) -> tuple[int, float, float] | None:
+        """The first step since the last call that did not go forward."""
+        first, self.first = self.first, None
+        return first
+
+
 class Feed:
     """Samples from the lines of a CSV whose first line names the columns.
 
@@ -92,6 +135,7 @@ class Feed:
             if role in chosen
         }
         self.has_velocity = "velocity" in self._index
+        self.clock = Clock(source)
 
     def _split(self, line: str) -> list[str]:
         if self._delimiter not in line:
@@ -106,7 +150,10 @@ class Feed:
                     f"{self._source}: row {number} has {len(cells)} cells, the header has "
                     f"{self._width}. A line holds one sample."
                 )
-            yield Sample(*(self._value(role, cells, number) for role in Sample._fields))
+            sample = Sample(*(self._value(role, cells, number) for role in Sample._fields))
+            self.clock.add(number, sample.time)
+            yield sample
+        self.clock.check()
 
     def _value(self, role: str, cells: list[str], number: int) -> float:
         if role not in self._index:
@@ -148,7 +195,8 @@ class Derivative:
 
 class Start(NamedTuple):
     """What the first samples tell: the samples themselves, with velocity; slowest and fastest
-    speed, m/s; the derivative that goes on, if there is no velocity column; the sample rate, Hz.
+    speed, m/s; the derivative that goes on, if there is no velocity column; the sample rate, Hz;
+    the severe remarks on the columns, beside which no figure is right.
     """
 
     samples: list[Moving]
@@ -156,9 +204,15 @@ class Start(NamedTuple):
     fastest: float
     derivative: Derivative | None
     rate: float
+    remarks: tuple[checks.Remark, ...] = ()
 
 
-def begin(samples: Iterator[Sample], has_velocity: bool, source: str) -> Start:
+def begin(
+    samples: Iterator[Sample],
+    has_velocity: bool,
+    source: str,
+    units: Mapping[str, str] | None = None,
+) -> Start:
     """The start of a stream from its first [`HEAD`][] samples.
 
     **Raises:** `ValueError` for too few samples or no motion.
@@ -167,13 +221,13 @@ def begin(samples: Iterator[Sample], has_velocity: bool, source: str) -> Start:
     if len(head) < LEAST:
         raise ValueError(f"{source}: {len(head)} samples came; {LEAST} are needed to begin.")
     time, position, velocity, force = (np.array(x, float) for x in zip(*head, strict=True))
+    found = _remarks(time, position, velocity, force, units or {})
     derivative = None
     if not has_velocity:
         log = Recording(time, force, position=position)
         width = max(2, int(signals.choose_half_width(log)))
         derivative = Derivative(width, signals.host_interval(log))
-        found = [derivative.add(sample) for sample in head]
-        moving = [m for m in found if m is not None]
+        moving = [m for m in map(derivative.add, head) if m is not None]
     else:
         moving = [Moving(s.time, s.velocity, s.force) for s in head]
     if len(moving) < LEAST:
@@ -188,7 +242,15 @@ def begin(samples: Iterator[Sample], has_velocity: bool, source: str) -> Start:
             "the axis moves."
         )
     rate = 1 / float(signals.host_interval(log))
-    return Start(moving, slowest, ABOVE * fastest, derivative, rate)
+    return Start(moving, slowest, ABOVE * fastest, derivative, rate, found)
+
+
+def _remarks(time, position, velocity, force, units) -> tuple[checks.Remark, ...]:
+    """The severe ones of [`checks.inspect`][]; what is rare in the head may come later."""
+    signals_read = {"position": position, "velocity": velocity}
+    known = {k: v for k, v in signals_read.items() if np.isfinite(v).any()}
+    log = Recording(time, force, units=units, **known)
+    return tuple(remark for remark in checks.inspect(log) if remark.severe)
 
 
 def rest(samples: Iterator[Sample], derivative: Derivative | None) -> Iterator[Moving]:

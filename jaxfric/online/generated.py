@@ -4,9 +4,8 @@ import math
 import re
 from importlib import resources
 
-from . import chart
-from .follower import SETTLED
-from .moments import GAP, NODES, WHOLE, start
+from . import changepoint, chart
+from .moments import ABOVE, GAP, NODES, WHOLE, start
 
 
 def c_source(
@@ -21,8 +20,8 @@ def c_source(
     """A self-contained C99 text that does what [`Follower`][jaxfric.online.Follower] does.
 
     For Coulomb and viscous friction, solved in closed form; forgetting by `keep`, not by a window.
-    A state takes 72 bytes a node. **Arguments:** as for [`start`][jaxfric.online.start]; `name`,
-    with which all names begin.
+    A state takes 72 bytes a node and 1.5 kB. **Arguments:** as for
+    [`start`][jaxfric.online.start]; `name`, with which all names begin.
 
     **Raises:** `ValueError` for speeds, times or rates that are none, or no name of C.
     """
@@ -31,9 +30,11 @@ def c_source(
         raise ValueError(f"{name!r} cannot begin a name in C: use letters, digits and _.")
     values = {
         "NAME": name, "NODES": nodes, "SLOWEST": _number(slowest), "FASTEST": _number(fastest),
-        "KEEP": _number(keep), "HEIGHT": _number(chart.threshold(false_alarms)),
+        "KEEP": _number(keep), "HEIGHT": _number(chart.threshold(0.5 * false_alarms)),
         "GAP": _number(GAP), "WHOLE": _number(WHOLE), "SLACK": _number(chart.SLACK),
-        "SETTLED": SETTLED, "LEARNING": chart.LEARNING,
+        "SETTLED": chart.SETTLED, "LEARNING": chart.LEARNING, "ABOVE": _number(ABOVE),
+        "RATE": _number(0.5 * false_alarms), "SPAN": changepoint.SPAN, "BEGIN": changepoint.BEGIN,
+        "FEWEST": changepoint.FEWEST, "ROUNDING": _number(changepoint.ROUNDING),
     }  # fmt: skip
     text = resources.files(__package__).joinpath("follower.c").read_text(encoding="utf-8")
     return re.sub(r"@([A-Z]+)@", lambda found: str(values[found[1]]), text)

@@ -23,6 +23,9 @@ from .chart import Chart
 NODES = 512
 # Of a longer step the velocity between two samples is not known: the stroke is thrown away.
 GAP = 5.0
+# Nodes reach so many times as far as the fastest sample: a motion that grows step by step widens
+# them once an octave.
+ABOVE = 2.0
 # A stroke of less than this share of the usual time is chatter at the slowest slip.
 WHOLE = 0.25
 
@@ -40,8 +43,8 @@ class Sums(NamedTuple):
 class State(NamedTuple):
     """All that is kept of a stream; a pytree of arrays of fixed shape.
 
-    - `nodes`: speeds, m/s, `(K,)`, rising geometrically from the slowest slip; a faster sample
-      widens them.
+    - `nodes`: speeds, m/s, `(K,)`, rising geometrically from the slowest slip; faster samples
+      widen them. `beyond`: whether the last sample was faster.
     - `total`: the `Sums` of closed strokes in each direction, `(2, K)`, forward first.
     - `stroke`: those of the stroke under way; `inside`: whether its beginning was seen, `(2,)`.
     - `ring`: the last strokes of each direction where a window forgets, `(2, n, K)`; else `n` = 0.
@@ -65,6 +68,7 @@ class State(NamedTuple):
     reference: Float[Array, "2 K"]
     chart: Chart
     height: Float[Array, ""]
+    beyond: Bool[Array, ""]
 
 
 class News(NamedTuple):
@@ -89,10 +93,10 @@ def start(
     """The state before the first sample.
 
     **Arguments:** `slowest`, the smallest speed that counts as slip, m/s (four deviations of the
-    velocity's noise); `fastest`, the highest speed that is expected, m/s (a faster sample widens
-    the nodes); `keep`, slip time after which a stroke weighs 1/e, s; or `window`, how many strokes
-    of each direction count;
-    `false_alarms`, of the change detection, a stroke of a direction.
+    velocity's noise); `fastest`, the highest speed that is expected, m/s (two faster samples
+    in succession widen the nodes); `keep`, slip time after which a stroke weighs 1/e, s; or
+    `window`, how many strokes of each direction count; `false_alarms`, of the change detection, a
+    stroke of a direction.
 
     **Raises:** `ValueError` for speeds, times or rates that are none.
     """
@@ -112,7 +116,7 @@ def start(
     inside, unknown = jnp.zeros(2, bool), jnp.full((2, nodes), jnp.nan)
     return State(
         speeds, sums, sums, inside, ring, two, two, jnp.asarray(keep, float), last, zero, unknown,
-        chart.empty(two), height,
+        chart.empty(two), height, jnp.zeros((), bool),
     )  # fmt: skip
 
 
@@ -121,32 +125,33 @@ def reference(state: State, force: Float[Array, "2 K"]) -> State:
     return state._replace(reference=force, chart=chart.empty(state.strokes))
 
 
-def merged(sums: Float[Array, "... K"], ratio: Float[Array, ""], of=jnp) -> Float[Array, "... K"]:
-    """Sums over nodes, each `ratio` times the one before, on nodes of twice that step.
-
-    Every second node stays. A sum between two is shared as a sample of its speed is: the result is
-    what the samples would have made there themselves, since a share that is straight between wide
-    nodes is straight between narrow ones. `of`: the arrays' module, `numpy` on the host.
-    """
-    odd, spare = sums[..., 1::2], [(0, 0)] * (sums.ndim - 1)
-    up = odd / (1 + ratio)  # (r − 1) / (r² − 1) of it to the upper one
-
-    def at(first: int, values):
-        return of.pad(values, [*spare, (first, sums.shape[-1] - first - values.shape[-1])])
-
-    return at(0, sums[..., ::2]) + at(0, odd - up) + at(1, up)
+def hats(nodes: Float[np.ndarray, " K"], speed: Float[np.ndarray, " N"]) -> np.ndarray:
+    """The shares of the nodes in speeds between them, `(N, K)`."""
+    place = np.clip(np.searchsorted(nodes, speed, side="right") - 1, 0, len(nodes) - 2)
+    part = np.clip((speed - nodes[place]) / (nodes[place + 1] - nodes[place]), 0.0, 1.0)
+    share, row = np.zeros((len(speed), len(nodes))), np.arange(len(speed))
+    share[row, place], share[row, place + 1] = 1 - part, part
+    return share
 
 
-def wider(state: State) -> State:
-    """The state on nodes of twice the step, up to fastest²/slowest; a reference does not reach so
-    far, and has to be given anew.
+def wider(state: State, speed: Float[Array, ""]) -> State:
+    """The state on nodes up to `ABOVE` times a speed, m/s; a reference has to be given anew.
+
+    A sum at a node is shared between the two new ones beside it as samples of its speed are: time,
+    impulse and mean speed stay what they were.
     """
     nodes = state.nodes
-    ratio = nodes[1] / nodes[0]
-    wide = nodes[0] * (nodes / nodes[0]) ** 2
+    low, step = nodes[0], jnp.log(ABOVE * speed / nodes[0]) / (nodes.size - 1)
+    wide = low * jnp.exp(step * jnp.arange(nodes.size, dtype=nodes.dtype))
+    place = jnp.clip(jnp.searchsorted(wide, nodes, side="right") - 1, 0, nodes.size - 2)
+    part = jnp.clip((nodes - wide[place]) / (wide[place + 1] - wide[place]), 0.0, 1.0)
+
+    def shared(x: Array) -> Array:
+        up, empty = jnp.broadcast_to(part, x.shape) * x, jnp.zeros_like(x)
+        return empty.at[..., place].add(x - up).at[..., place + 1].add(up)
 
     def moved(sums: Sums) -> Sums:
-        return Sums(merged(sums.weight, ratio), merged(sums.load, ratio), sums.square)
+        return Sums(shared(sums.weight), shared(sums.load), sums.square)
 
     state = state._replace(
         nodes=wide, total=moved(state.total), stroke=moved(state.stroke), ring=moved(state.ring)
@@ -162,9 +167,11 @@ def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
     """
     time, velocity, _ = sample
     known = jnp.all(jnp.isfinite(sample))
-    state = jax.lax.while_loop(
-        lambda s: known & (jnp.abs(velocity) > s.nodes[-1]), wider, state
-    )  # as wide as the fastest sample needs
+    fast = known & (jnp.abs(velocity) > state.nodes[-1])
+    widened = fast & state.beyond
+    beyond = jnp.where(known, fast & ~widened, state.beyond)
+    state = jax.lax.cond(widened, wider, lambda s, _: s, state, jnp.abs(velocity))
+    known = known & ~beyond  # a lone sample beyond all others counts as missing
     step = time - state.last[0]
     usual = jnp.where(state.interval > 0, state.interval, step)
     linked = (step > 0) & (step <= GAP * usual) & known
@@ -184,14 +191,15 @@ def update(state: State, sample: Float[Array, " 3"]) -> tuple[State, News]:
     closed = inside & ended
     state = state._replace(stroke=grown)
     # A stroke that a gap broke off is thrown away.
-    broken = state.inside & ~inside
+    broken = known & state.inside & ~inside
     after, news = _closed(state, closed, broken)
     # The mean step forgets, so that it follows a clock that changes.
     interval = jnp.where(linked, usual + 0.02 * (step - usual), state.interval)
     return after._replace(
-        inside=inside & ~closed,
+        inside=jnp.where(known, inside & ~closed, state.inside),
         last=jnp.where(known, sample, state.last),
         interval=interval,
+        beyond=beyond,
     ), news
 
 
