@@ -70,9 +70,11 @@ def summarise(
     missing |= bool(apart and errors.get("holdout_values"))
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
+    # In another recording that is compared with, what has no name may be as well.
+    seen = better.dropped if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     return Explanation(
-        verdict=verdict_of(findings, new, later, much, standing, remarks, known.fit is not None),
+        verdict=verdict_of(findings, new, later, much, standing, remarks, seen),
         where=structure.documents(before, findings, better.first, units, known.structured),
         findings=findings,
         not_confirmed=refuted,

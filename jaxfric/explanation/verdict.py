@@ -9,7 +9,6 @@ from ..checks import LEFT, Remark
 from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY, OF_BASE
 from .contest import Contest
-from .doubts import NOT_BETTER
 from .finding import Finding
 from .regression import Fit
 from .significance import LEVEL
@@ -109,20 +108,21 @@ def verdict_of(
     rough: bool,
     standing: bool,
     noted: Sequence[Remark],
-    compared: bool,
+    dropped: Sequence[str],
 ) -> str:
     """The verdict, which claims no more than the remarks allow.
 
     **Arguments:** `before`, `after`: structure that the baseline and the findings leave; `rough`
-    and `standing`, by [`rough`][] and [`stand_ins`][]; `noted`: the remarks; `compared`: whether
-    with another recording, in which what has no name may be as well.
+    and `standing`, by [`rough`][] and [`stand_ins`][]; `noted`: the remarks; `dropped`: effects
+    whose findings went as the model with them is worse. Those of single moments are seen of
+    healthy machines too: of what no law describes of a reversal.
     """
     verdict = _by_structure(findings, before, after, rough, standing)
     doubtful = any(remark.severe for remark in noted)
     if verdict == "explained" and doubtful:
         return "partly_explained"
-    dropped = any(remark.name == NOT_BETTER for remark in noted) and not compared
-    return "unexplained" if verdict == "consistent" and (doubtful or dropped) else verdict
+    seen = any(name not in EFFECTS or not EFFECTS[name].isolated for name in dropped)
+    return "unexplained" if verdict == "consistent" and (doubtful or seen) else verdict
 
 
 def _by_structure(findings, before, after, rough: bool, standing: bool) -> str:
