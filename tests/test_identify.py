@@ -526,3 +526,13 @@ def test_a_velocity_from_the_position_takes_nothing_off_a_bump_in_silence(monkey
 
     monkeypatch.setattr(identifying, "narrowed", as_chosen)
     assert off(jf.identify("gaussian", run), SHARP).max() > 2
+
+
+def test_single_precision_converges_as_far_as_its_cost_can_tell():
+    with jax.enable_x64(False):
+        found = jf.identify(
+            "lorentzian", jf.scenario.record(jf.scenario.machine(), sample_rate=RATE)
+        )
+        assert found.model.alpha.dtype == jnp.float32 and found.result_name == "successful"
+        stopped = dataclasses.replace(found, result=jf.Result.not_converged)
+    assert 'jax.config.update("jax_enable_x64", True)' in stopped.diagnosis
