@@ -670,19 +670,21 @@ def test_a_unit_that_nothing_names_is_said(tmp_path, head, options, said):
 # ---- what is no log of one axis ----
 
 
-def two_axes(path, apart, count=400):
-    """Rows of two axes in turn, each with its own position, `apart` at their beginning."""
+def two_axes(path, alike, count=400):
+    """Rows of two axes in turn, each with its own force, and its own motion if not `alike`."""
     rows = []
     for i in range(count):
-        places = (np.sin(i / 30), apart + 0.5 * np.cos(i / 20))
-        rows += [f"{i / 1000:.3f},{x:.6f},{i % 7}" for x in places]
+        places = (np.sin(i / 30), np.sin(i / 30) if alike else 0.1 + 0.5 * np.cos(i / 20))
+        forces = (10 * np.cos(i / 30), 25 + i % 3)
+        rows += [f"{i / 1000:.3f},{x:.6f},{f:.3f}" for x, f in zip(places, forces, strict=True)]
     path.write_text("\n".join(["time,position,force", *rows]))
     return path
 
 
-def test_two_logs_row_by_row_are_told(tmp_path):
-    with pytest.raises(ValueError, match="2 samples in turn .* the position jumps to and fro"):
-        io.read(two_axes(tmp_path / "log.csv", 0.1))
+@pytest.mark.parametrize(("alike", "role"), [(False, "position"), (True, "force")])
+def test_two_logs_row_by_row_are_told(tmp_path, alike, role):
+    with pytest.raises(ValueError, match=f"2 samples in turn .* the {role} jumps to and fro"):
+        io.read(two_axes(tmp_path / "log.csv", alike))
 
 
 def test_stamps_that_are_rounded_are_no_two_logs(tmp_path):
