@@ -38,15 +38,24 @@ TURNS = {"rad": 2 * math.pi, "deg": 360.0, "rev": 1.0}
 # What one of a unit is in the first unit of its kind.
 _KINDS: tuple[Mapping[str, float], ...] = (
     {"m": 1, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048},
-    {"rad": 1, "mrad": 1e-3, "deg": math.pi / 180, "rev": 2 * math.pi},
-    {"N": 1, "mN": 1e-3, "kN": 1e3, "MN": 1e6, "lbf": 4.4482216153, "kgf": 9.80665},
     {
-        "N·m": 1, "mN·m": 1e-3, "µN·m": 1e-6, "kN·m": 1e3, "MN·m": 1e6, "N·cm": 1e-2,
-        "lbf·ft": 1.3558179483, "lbf·in": 0.112984829,
+        "rad": 1, "mrad": 1e-3, "µrad": 1e-6, "rev": 2 * math.pi, "deg": math.pi / 180,
+        "mdeg": math.pi / 180e3, "arcmin": math.pi / 10800, "arcsec": math.pi / 648000,
     },
-    {"A": 1, "mA": 1e-3},
+    {
+        "N": 1, "kN": 1e3, "MN": 1e6, "daN": 10, "cN": 1e-2, "mN": 1e-3, "µN": 1e-6,
+        "lbf": 4.4482216153, "kgf": 9.80665,
+    },
+    {
+        "N·m": 1, "mN·m": 1e-3, "µN·m": 1e-6, "kN·m": 1e3, "MN·m": 1e6, "cN·m": 1e-2, "N·cm": 1e-2,
+        "N·mm": 1e-3, "lbf·ft": 1.3558179483, "lbf·in": 0.112984829, "ozf·in": 0.00706155181,
+        "kgf·m": 9.80665, "kgf·cm": 0.0980665,
+    },
+    {"A": 1, "mA": 1e-3, "µA": 1e-6},
     {"V": 1, "mV": 1e-3},
 )  # fmt: skip
+TORQUES = frozenset(next(kind for kind in _KINDS if "N·m" in kind))
+"""Units of torque."""
 
 
 def factor(unit: str, other: str) -> float | None:

@@ -1450,6 +1450,9 @@ def test_a_finding_that_the_held_out_recording_shows_but_is_worse_with_says_so()
     assert "worse there: it takes the force error from 2.19% to 2.23%" in text
     better.worse = before, after._replace(held=0.0219, filtered_held=0.004001)
     assert "filtered force error from 0.4000% to 0.4001%" in reported._reason(finding, better)
+    better.worse = before, improvement.Errors(0.021, 0.0219, 0.003, 0.002)
+    text = reported._reason(finding, better)
+    assert "worse on this recording: it takes the force error from 2.00% to 2.10%" in text
     assert "does not bear it out" in reported._reason(finding._replace(confirmed=False), better)
 
 

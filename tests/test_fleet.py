@@ -19,7 +19,8 @@ from jaxfric.cli import main
 from jaxfric.cli.fleet import span
 from jaxfric.cli.values import process
 from jaxfric.data import io
-from jaxfric.fleet import batches, comparing, files as listing, journal, tables
+from jaxfric.fleet import batches, comparing, files as listing, journal, tables, telling
+from jaxfric.identification.identified import Result
 
 ROOT = Path(__file__).parents[1]
 MODEL = ("--model", "coulomb-viscous")
@@ -460,3 +461,36 @@ def test_lengths_of_one_bucket_share_a_batch(tmp_path):
     assert len({item.kind for item in found}) == 1
     assert [item.facts["samples"] for item in found] == [801, 850, 890]
     assert dataclasses.is_dataclass(found[0].recording)
+
+
+def a_row(result="successful", error=0.02, warnings="", reason="", value=1.0):
+    entry = {"value": value, "standard_error": 0.1, "unit": "N"}
+    row = {"result": result, "filtered_force_error": error, "warnings": warnings}
+    return row | {"reason": reason, "parameters": {"coulomb+": entry}}
+
+
+def test_rows_that_describe_no_axis_are_not_compared():
+    given = {"a": a_row(), "b": a_row(error=0.56, value=-57.0), "d": a_row(result="contradictory")}
+    given["c"] = a_row(warnings="negative_parameter, force_late", value=-3.0)
+    files = [fleet.File(path, {}, "", "", 0, 0) for path in given]
+    found = fleet.compare(files, given)
+    assert [(one.name, one.recordings, one.median) for one in found.usual][0] == ("coulomb+", 1, 1)
+    said = telling.summary(files, given, found)
+    assert (
+        "Not compared, for their force error is over 25% or their friction negative: b, c" in said
+    )
+
+
+def test_a_result_is_told_with_what_each_file_contradicts_itself_in():
+    words = Result[Result.contradictory]
+    given = {name: a_row("contradictory", reason=f"{words} So by {name}.") for name in "abcd"}
+    given |= {name: a_row(warnings="force_late") for name in "efghi"} | {"j": a_row(warnings="x")}
+    files = [fleet.File(path, {}, "", "", 0, 0) for path in given]
+    told = telling.troubles(files, given).splitlines()
+    assert told[:5] == [
+        f"contradictory: {words}",
+        *(f"  {name}: So by {name}." for name in "abc"),
+        "  and 1 more",
+    ]
+    assert "warning force_late: 5 recordings: e, f, g and 2 more" in told
+    assert "warning x: 1 recording: j" in told

@@ -166,7 +166,10 @@ def test_closed_windows_are_refused_to_terms_of_position():
 
 
 def test_a_missing_signal_is_named():
+    # Behind an interruption the integral of the velocity is not known.
     log = dataclasses.replace(recording(machine()), position=None)
+    halves = (np.arange(log.num_samples) > log.num_samples // 2).astype(np.int32)
+    log = dataclasses.replace(log, segment=halves, num_segments=2)
     with pytest.raises(ValueError, match="needs position"):
         jf.identify(jf.models.coulomb_viscous() + Spring(), log)
 
@@ -526,3 +529,13 @@ def test_a_velocity_from_the_position_takes_nothing_off_a_bump_in_silence(monkey
 
     monkeypatch.setattr(identifying, "narrowed", as_chosen)
     assert off(jf.identify("gaussian", run), SHARP).max() > 2
+
+
+def test_single_precision_converges_as_far_as_its_cost_can_tell():
+    with jax.enable_x64(False):
+        found = jf.identify(
+            "lorentzian", jf.scenario.record(jf.scenario.machine(), sample_rate=RATE)
+        )
+        assert found.model.alpha.dtype == jnp.float32 and found.result_name == "successful"
+        stopped = dataclasses.replace(found, result=jf.Result.not_converged)
+    assert 'jax.config.update("jax_enable_x64", True)' in stopped.diagnosis

@@ -517,14 +517,17 @@ class Reported:
         return 0.12 + 0.003 * sum(n in self.names for n in self.wrong) + 0.004 * ("a" in self.names)
 
 
-def test_a_change_whose_interval_holds_none_is_no_finding(monkeypatch):
+@pytest.mark.parametrize(("moment", "isolated"), [("step_time", False), ("", True)])
+def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, moment, isolated):
     """Beside its moment's uncertainty; what has no moment stays."""
 
     class Dated(Reported):
         def __init__(self, names, wrong):
             super().__init__(names, wrong)
             for each in self.selection.selected:
-                each.effect.moment = "" if each.effect.name == "a" else "step_time"
+                lasting = each.effect.name == "a"
+                each.effect.moment = "" if lasting else moment
+                each.effect.isolated = isolated and not lasting
             self.selection.last = types.SimpleNamespace(terms=[terms.Viscous() for _ in names])
             self.selection.term_index = lambda number: number
 

@@ -57,12 +57,23 @@ def test_a_size_no_larger_than_its_interval_may_be_nil():
 def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
     values = {
         "amplitude": estimate(0.99, 0.1, "N"),
-        "friction_period": estimate(0.43, 0.22, "m"),
+        "friction_period": estimate(0.43, 0.12, "m"),
     }
     told = sentence("position_dependent_friction", values, 0.14, (), Extent(0.0, 0.25))
     assert "varies slowly along the stroke, by 0.99 N" in told and "0.43" not in told
     told = sentence("position_dependent_friction", values, 0.14, (), Extent(0.0, 2.0))
     assert "with a period of 0.43 m" in told
+
+
+def test_a_magnitude_whose_interval_holds_zero_is_no_number():
+    values = {"knee": estimate(5.3, 1.6, "N·m"), "saturation": estimate(6.0, 111.0, "1")}
+    told = sentence("actuator_saturation", values, 0.73, ())
+    assert "Above 5.3 N·m ± 3.2 N·m" in told and "111" not in told
+    assert "by an amount that this recording cannot tell of the excess" in told
+    values = {"knee": estimate(187.0, 123.0, "N·m"), "saturation": estimate(6.0, 1.0, "1")}
+    assert "Above an amount that this" in sentence("actuator_saturation", values, 0.73, ())
+    values = {"load_resonance": estimate(40, 1, "1/s"), "damping_ratio": estimate(0.01, 0.01, "1")}
+    assert "a damping ratio of at most 0.03" in sentence("compliance", values, 0.73, ())
 
 
 @pytest.mark.parametrize(("reach", "soft"), [(0.09, True), (0.01, False)])

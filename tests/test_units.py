@@ -82,6 +82,19 @@ def test_rotary_axes_are_told_by_their_units(names, rotary):
         ("torque [lbf·in]", "force", "lbf·in"),
         ("current [Arms]", "force", "A"),
         ("speed [1/s]", "velocity", None),
+        ("force_kN", "force", "kN"),
+        ("forcekN", "force", "kN"),
+        ("torque_mNm", "force", "mN·m"),
+        ("torque_uNm", "force", "µN·m"),
+        ("Torque_kNm", "force", "kN·m"),
+        ("torque_MNm", "force", "MN·m"),
+        ("force_mN", "force", "mN"),
+        ("current_mA", "force", "mA"),
+        ("motorTorqueNm", "force", "N·m"),
+        ("torque_mN_m", "force", "mN·m"),
+        ("torque_lbf_in", "force", "lbf·in"),
+        ("angle_arcmin", "position", "arcmin"),
+        ("vel_mm_sec", "velocity", "mm/s"),
     ],
 )
 def test_units_are_read_in_the_spellings_of_loggers(name, role, unit):
@@ -92,6 +105,23 @@ def test_a_column_given_by_the_user_states_its_unit_as_well():
     assert stated_unit("Drehzahl [U/min]", "velocity") == "rpm"
     assert stated_unit("drehzahl_rpm", "velocity") == "rpm"
     assert stated_unit("axis_a", "force") is None
+    assert stated_unit("tau1_uNm", "force") == "µN·m"
+    assert stated_unit("axis_in_lb", "force") == "lbf·in"
+    assert stated_unit("axis_mm_filtered", "position") == "mm"
+    assert stated_unit("w_rad_s", "velocity") == "rad/s"
+    assert stated_unit("kN", "force") == "kN"
+
+
+def test_a_unit_that_the_user_names_is_spelt_as_one_that_a_column_states(tmp_path):
+    rows = "".join(f"{i / 100},{i % 7},{i % 3}\n" for i in range(40))
+    (tmp_path / "log.csv").write_text(f"t,axis_deg,axis_uNm\n{rows}")
+    roles = {"position": "axis_deg", "force": "axis_uNm"}
+    stated = io.read(tmp_path / "log.csv", columns=roles).unit_names
+    assert stated == {"force": "µN·m", "position": "deg"}
+    given = io.read(tmp_path / "log.csv", columns=roles, units={"force": "uNm"}).unit_names
+    assert given == stated
+    named = io.read(tmp_path / "log.csv", columns=roles, units={"force": "ticks"}).unit_names
+    assert named["force"] == "ticks"
 
 
 @pytest.mark.parametrize(
@@ -122,6 +152,8 @@ def test_a_bracket_that_is_no_unit_passes(column):
         ("time_h,x,f", "time from time_h × 3600"),
         ("t,speed [U/min],f", "velocity from speed [U/min] × 0.10472"),
         ("t,speed [mm/min],f", "velocity from speed [mm/min] × 0.0166667"),
+        ("t,speed_krpm,torque_mNm", "velocity from speed_krpm × 104.72"),
+        ("t,speed_kmh,f", "velocity from speed_kmh × 0.000277778"),
     ],
 )
 def test_units_that_are_not_per_second_are_converted_and_said(tmp_path, header, said):

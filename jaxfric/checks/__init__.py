@@ -2,6 +2,7 @@
 
 from .design import MATTERS as MATTERS, Design as Design
 from .fitted import (
+    LARGE as LARGE,
     LEFT as LEFT,
     Estimated as Estimated,
     fitted as fitted,

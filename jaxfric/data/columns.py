@@ -8,12 +8,12 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping
 
-from ..units import SI
+from ..units import SI, TORQUES
 from . import makers
 from .languages import PARTICLES, english, plain
 from .nearest import meant
 from .printable import listed
-from .spellings import FITTING, spelt, unit_of
+from .spellings import FITTING, apart, spelt, unit_of
 
 ROLES = (
     "time", "position", "velocity", "force", "reference", "load", "temperature", "segment"
@@ -39,6 +39,8 @@ _MEASURED = frozenset(
     "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
     "drive".split()
 )
+# How a signal was treated, in words behind its unit.
+_TREATED = frozenset({"filtered", "filt", "raw", "smoothed"})
 # Of a signal that is measured, too, its estimate is not needed.
 _ESTIMATED = frozenset({"estimate", "estimated", "est"})
 _WANTED = frozenset(
@@ -60,11 +62,20 @@ _REMARK = re.compile(
 
 def _words(name: str) -> list[str]:
     """The words of a name without its brackets and its maker's code, in English."""
-    name = _BRACKETS.sub(" ", makers.named(plain(name)))
-    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name.rsplit(".", 1)[-1])
-    words = [word for word in re.split(r"[^\w°%]+|_+", name.lower()) if word]
-    words = [word for word in words if word not in PARTICLES] or words
-    return [each for word in words for each in english(word)]
+    return [word.lower() for word in _cased(name)]
+
+
+def _cased(name: str) -> list[str]:
+    """As `_words`, in the name's own capitals: `MN` and `mN` are two units."""
+    name = apart(_BRACKETS.sub(" ", makers.named(plain(name))).rsplit(".", 1)[-1])
+    words = [word for word in re.split(r"[^\w°%]+|_+", name) if word]
+    words = [word for word in words if word.lower() not in PARTICLES] or words
+    return [each for word in words for each in _english(word)]
+
+
+def _english(word: str) -> list[str]:
+    found = english(word.lower())
+    return [word] if found == [word.lower()] else found
 
 
 def _plain_role(words: list[str]) -> str | None:
@@ -86,14 +97,15 @@ def _role_of_words(words: list[str]) -> str | None:
 def describe(name: str) -> tuple[str | None, str | None]:
     """The role that a column's name stands for and the unit that it states, each or `None`."""
     bracket = _BRACKETS.search(makers.named(plain(name)))
-    words = _words(name)
+    cased, words = _cased(name), _words(name)
     if (role := _role_of_words(words)) is not None:
         stated = bracket[1] if bracket else "rpm" if words[-1:] == ["rpm"] else ""
         return role, unit_of(stated, role)
     for tail in (1, 2, 3):
         role = _role_of_words(words[:-tail]) if len(words) > tail else None
-        unit = unit_of("_".join(words[-tail:]), role) if role else None
-        if unit and words[-1] != "in":  # `position_in` is rather an input than in inches
+        unit = unit_of("_".join(cased[-tail:]), role) if role else None
+        # `position_in` is rather an input than in inches.
+        if unit and (tail > 1 or words[-1] != "in"):
             return role, unit
     return None, None
 
@@ -102,15 +114,18 @@ def stated_unit(name: str, role: str) -> str | None:
     """The unit that the name of a role's column states, or `None`.
 
     A column that is given a role may be called anything: then a bracket states a unit, and a tail
-    of more than one letter (`foo_rpm`; `axis_a` is hardly in ampere).
+    of more than one letter (`foo_rpm`; `axis_a` is hardly in ampere), also before words that say
+    which signal it is (`foo_rpm_filtered`).
     """
     own, unit = describe(name)
     if own == role:
         return unit
     if bracket := _BRACKETS.search(makers.named(name)):
         return unit_of(bracket[1], role)
-    words = _words(name)
-    tails = ("_".join(words[-tail:]) for tail in (3, 2, 1) if len(words) > tail)
+    words = _cased(name)
+    while len(words) > 1 and (words[-1].isdigit() or words[-1].lower() in _MEASURED | _TREATED):
+        words = words[:-1]
+    tails = ("_".join(words[-tail:]) for tail in (3, 2, 1) if len(words) >= tail)
     return next((u for t in tails if len(t) > 1 and (u := unit_of(t, role))), None)
 
 
@@ -283,7 +298,7 @@ def units(
         force = "N·m" if "torque" in words else "A" if "current" in words else None
     if force:
         found["force"] = force
-    if position is None and (given.get("force") or force or "").endswith("N·m"):
+    if position is None and (given.get("force") or force) in TORQUES:
         position = None if scale.get("position") is not None else "rad"
     if position:
         found["position"] = position

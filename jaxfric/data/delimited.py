@@ -17,6 +17,9 @@ from .printable import short
 _SMALL_CSV = 5_000_000  # bytes
 # Of a file so much is read for its header, and so much of its lines is held at once, bytes.
 _HEAD, _BLOCK = 65536, 1 << 24
+# In the beginning of a text there is no control character; a block that a crash left empty (NUL) is
+# at its end.
+_BEGIN, _CONTROL = 512, rb"[\x00-\x08\x0e-\x1a\x1c-\x1f]"
 # Numbers with a point, with a comma, and with more than a decimal sign.
 _EXPONENT = r"(?:[eE][-+]?\d+)?"
 _POINT = r"[-+]?(?:\d+\.\d*|\.\d+)" + _EXPONENT
@@ -49,6 +52,12 @@ def read_csv(path: Path) -> Table:
     """
     with path.open("rb") as file:
         raw = file.read(_HEAD)
+    if found := re.search(_CONTROL, raw[:_BEGIN]):
+        raise ValueError(
+            f"{path}: this is no text: byte {found.start() + 1} is a control character. If it is a "
+            "file of another kind, give it that suffix (.mat, .npz, .parquet); else write the log "
+            "as CSV."
+        )
     end = raw.rfind(b"\n") + 1
     large = path.stat().st_size > _SMALL_CSV
     if not (large and end):

@@ -17,6 +17,7 @@ from .per_second import per_second
 from .printable import encodable
 from .provenance import sha256
 from .recording import Recording
+from .spellings import unit_of
 from .tables import load
 from .turns import angles
 from .writing import (
@@ -113,6 +114,7 @@ def read_with_notes(
         columns = dict(columns or {}) | {"time": CLOCK}
     chosen = names.assign(table.columns, columns, source, set_point)
     _check_arguments(chosen, scale, units, period, source)
+    units = {role: unit_of(unit, role) or unit for role, unit in units.items()}  # `uNm` is µN·m
     if counts_per_rev is not None:
         scale, units = angles(chosen, scale, units, counts_per_rev, source)
     implied, units = per_second(chosen, scale, units, source)

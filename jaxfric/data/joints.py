@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from .columns import describe
 from .printable import listed
+from .spellings import apart
 
 ROLES = ("position", "force")
 # What the joint's actuator was told, in its own unit, in place of the joint's force.
@@ -18,8 +19,7 @@ _BESIDE = frozenset("joint joints state states jointstate jointstates data robot
 
 
 def _words(name: str) -> list[str]:
-    name = re.sub(r"([a-z])([A-Z])", r"\1_\2", name)
-    return re.findall(r"\d+|[^\W\d_]+", name.lower())
+    return re.findall(r"\d+|[^\W\d_]+", apart(name).lower())
 
 
 def columns_of(

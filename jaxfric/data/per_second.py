@@ -30,7 +30,7 @@ def per_second(
         return found, named
     length, seconds = _parts(velocity)
     wanted = units.get("position") or stated.get("position")
-    if wanted is None and velocity != "rpm":
+    if wanted is None and not velocity.endswith("rpm"):
         wanted = length
     elif wanted is None:  # an angle beside a torque is in rad
         others = {role: name for role, name in chosen.items() if role != "velocity"}
@@ -48,10 +48,10 @@ def per_second(
 
 def _parts(velocity: str) -> tuple[str, float]:
     """The unit of length or angle in a unit of velocity, and the seconds that it goes by."""
-    if velocity == "rpm":
-        return "rev", 60.0
+    if velocity.endswith("rpm"):
+        return "rev", 60.0 if velocity == "rpm" else 0.06
     length, _, per = velocity.rpartition("/")
-    return length, 60.0 if per == "min" else 1.0
+    return length, {"s": 1.0, "min": 60.0, "h": 3600.0}[per]
 
 
 def _unrelated(chosen: Mapping[str, str], velocity: str, wanted: str | None, source: str) -> str:

@@ -1,6 +1,11 @@
-"""How loggers spell units, in English and German, and which unit fits which signal."""
+"""How loggers spell units, in English and German, and which unit fits which signal.
+
+A name may spell a unit in capitals and small letters, `torque_mNm`: [`apart`][] keeps it whole.
+"""
 
 import re
+
+from ..units import TORQUES
 
 # Spelling in a name -> the name of the unit. Letters that are synonyms (`s` alone) still match
 # as words, because a unit is only taken off where something is left in front of it.
@@ -18,42 +23,62 @@ _SPELLINGS = {
     "nm": "nm nanometer nanometers nanometre nanometres", "km": "km kilometer kilometre",
     "in": "in inch inches zoll", "ft": "ft foot feet",
     "rad": "rad rads radian radians radiant bogenmaß",
-    "mrad": "mrad milliradian milliradians", "deg": "deg degs ° degree degrees",
+    "mrad": "mrad milliradian milliradians", "µrad": "urad µrad μrad microradian microradians",
+    "deg": "deg degs ° degree degrees", "mdeg": "mdeg", "arcmin": "arcmin arcminute arcminutes",
+    "arcsec": "arcsec arcsecs arcsecond arcseconds",
     "rev": "rev revs revolution revolutions turn turns umdr umdr. umdrehung umdrehungen",
     "counts": "counts count cts cnt cnts inc incs increment increments ink inkr inkrement "
     "inkremente tick ticks pulse pulses",
-    "N": "n newton newtons", "kN": "kn kilonewton", "mN": "mn millinewton", "lbf": "lbf lb lbs",
-    "kgf": "kgf kp", "A": "a amp amps ampere amperes arms apk", "mA": "ma milliamp milliamps "
-    "milliampere", "V": "v volt volts", "mV": "mv millivolt millivolts",
+    "N": "n newton newtons", "kN": "kn kilonewton", "daN": "dan", "cN": "cn",
+    "mN": "mn millinewton", "µN": "un µn μn micronewton", "lbf": "lbf lb lbs", "kgf": "kgf kp",
+    "A": "a amp amps ampere amperes arms apk", "mA": "ma milliamp milliamps milliampere",
+    "µA": "ua µa μa microamp microamps", "V": "v volt volts", "mV": "mv millivolt millivolts",
     "N·m": "n·m n*m n.m n-m n_m n⋅m newtonmeter newtonmeters newtonmetre newtonmetres",
-    "mN·m": "mnm mn·m mn*m", "µN·m": "unm µnm μnm", "kN·m": "knm kn·m kn*m",
-    "N·cm": "ncm n·cm n*cm", "lbf·ft": "lbf·ft lbf*ft lbfft ftlb ft-lb ftlbf", "lbf·in": "lbf·in "
-    "lbf*in lbfin inlb in-lb inlbf", "%": "% percent prozent", "‰": "‰ permille promille 0.1%",
+    "mN·m": "mnm mn·m mn*m", "µN·m": "unm µnm μnm", "kN·m": "knm kn·m kn*m", "N·mm": "nmm",
+    "N·cm": "ncm n·cm n*cm", "cN·m": "cnm", "kgf·m": "kgfm kgm", "kgf·cm": "kgfcm kgcm",
+    "ozf·in": "ozfin ozin inoz", "lbf·ft": "lbf·ft lbf*ft lbfft ftlb ft-lb ftlbf",
+    "lbf·in": "lbf·in lbf*in lbfin inlb in-lb inlbf",
+    "%": "% pct percent prozent", "‰": "‰ permille promille 0.1%",
     "rpm": "rpm upm 1/min min-1 min^-1 min⁻¹ u/min umdr/min umdr./min umdrehungen/min r/min "
     "rev/min revs/min revolutions/min 1/minute u_min umdr_min r_min rev_min 1_min",
-    "m/s": "mps", "rev/s": "hz rps u/s umdr/s",
+    "krpm": "krpm", "m/s": "mps", "km/h": "km/h kmh km_h kph", "rev/s": "hz rps u/s umdr/s",
 }  # fmt: skip
 _UNITS = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()}
 _UNITS["n m"] = "N·m"
 _PER_SECOND = re.compile(
-    r"^(.+?)(?:/(?:s|sec|second|sek|sekunde)|[_ ·*]?s(?:\^?-1|⁻¹)|[_ ]per[_ ]s(?:ec|econd)?|_s|ps)$"
+    r"^(.+?)(?:/(?:s|sec|second|sek|sekunde)|[_ ·*]?s(?:\^?-1|⁻¹)|[_ ]per[_ ]s(?:ec|econd)?"
+    r"|_s(?:ec)?|ps)$"
 )
 _PER_MINUTE = re.compile(
     r"^(.+?)(?:/min(?:ute)?|[_ ·*]?min(?:\^?-1|⁻¹)|[_ ]per[_ ]min(?:ute)?|_min)$"
 )
 
+# Prefix and unit of a force, in mixed case.
+_MIXED = r"(?:da|[nuµμmcdkM])(?:N(?:cm|mm?|M)?|A|V)(?![^\W_])"
+_JOINED = re.compile(
+    rf"(?i:(?<=force)|(?<=torque)|(?<=moment)|(?<=current)|(?<=effort))(?={_MIXED})"
+)
+_CAMEL = re.compile(rf"(?<![^\W_]){_MIXED}|(?<=[a-z])(?=[A-Z])")
+
 _LENGTHS = {
-    "m", "mm", "µm", "nm", "cm", "km", "in", "ft", "rad", "mrad", "deg", "rev", "counts"
+    "m", "mm", "µm", "nm", "cm", "km", "in", "ft", "rad", "mrad", "µrad", "deg", "mdeg", "arcmin",
+    "arcsec", "rev", "counts",
 }  # fmt: skip
 FITTING = {
     "time": {"s", "ms", "µs", "ns", "min", "h"},
     "position": _LENGTHS,
     "reference": _LENGTHS,
-    "velocity": {f"{length}/{per}" for length in _LENGTHS for per in ("s", "min")} | {"rpm"},
-    "force": {"N", "kN", "mN", "MN", "lbf", "kgf", "A", "mA", "V", "mV", "%", "‰"}
-    | {f"{prefix}N·m" for prefix in ("", "m", "µ", "k", "M")}
-    | {"N·cm", "lbf·ft", "lbf·in"},
+    "velocity": {f"{length}/{per}" for length in _LENGTHS for per in ("s", "min")}
+    | {"km/h", "rpm", "krpm"},
+    "force": {f"{prefix}N" for prefix in ("", "k", "da", "c", "m", "µ", "M")}
+    | {"lbf", "kgf", "A", "mA", "µA", "V", "mV", "%", "‰"}
+    | TORQUES,
 }
+
+
+def apart(name: str) -> str:
+    """`motorTorque_mNm` as `motor_Torque_mNm`: the words of a name parted, a unit left whole."""
+    return _CAMEL.sub(lambda found: found[0] or "_", _JOINED.sub("_", name))
 
 
 def is_unit(text: str) -> bool:
@@ -78,6 +103,10 @@ def spelt(text: str, role: str) -> str | None:
         return "deg"
     if text in _UNITS:
         return _UNITS[text]
+    parts = re.split(r"[_ ·⋅*.-]", text)
+    # `mN_m`, `in_lb`; single letters (`i_m_a`) are rather names.
+    if role == "force" and max(map(len, parts)) > 1 and "".join(parts) in _UNITS:
+        return _UNITS["".join(parts)]
     for pattern, per in ((_PER_SECOND, "s"), (_PER_MINUTE, "min")):
         found = pattern.match(text)
         inner = "deg" if found and raw.startswith("Grad") and found[1] == "grad" else None

@@ -131,13 +131,15 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
 
 
 def without_unsure(findings: Findings) -> Findings:
-    """Without changes at a moment whose size may as well be none once the moment is uncertain.
+    """Without changes at a moment whose size may as well be none once the moment is uncertain, and
+    without pushes all of which may be none.
 
-    What they are told by is the value before and after: an interval that holds both says nothing.
+    What a change is told by is the value before and after: an interval that holds both says
+    nothing. Pushes are told by their sizes alone.
     """
     while True:
         selected = findings.selection.selected
-        dated = [n for n, each in enumerate(selected) if each.effect.moment]
+        dated = [n for n, s in enumerate(selected) if s.effect.moment or s.effect.isolated]
         if not dated:
             return findings
         values = estimated(findings)[findings.selection.term_index(0) :]

@@ -13,6 +13,7 @@ _SMALLER = {
     "N·m": (("mN·m", 1e-3), ("µN·m", 1e-6)),
     "A": (("mA", 1e-3),),
 }
+UNSEEN = "an amount that this recording cannot tell"
 # Below this, a smaller unit is used.
 SMALL = 0.05
 
@@ -24,7 +25,7 @@ def quantity(estimate: Estimate, smaller: bool = True) -> str:
     """
     value, error = float(estimate.value), float(estimate.standard_error)
     if math.isinf(error):  # the data cannot see it, and its value is any
-        return "an amount that this recording cannot tell"
+        return UNSEEN
     half = float(estimate.half_width()) if error > 0 else 0.0
     name, scale = _unit(estimate.unit, max(abs(value), half) if smaller else 1.0)
     value, half = value / scale, half / scale

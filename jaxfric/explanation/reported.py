@@ -11,7 +11,7 @@ from .baseline import Baseline
 from .evidence import Evidence
 from .finding import Finding, Moved
 from .findings import Findings
-from .improvement import Improved
+from .improvement import Errors, Improved
 from .mismatch import Mismatch
 from .quantities import rise
 from .regression import Fit
@@ -88,14 +88,24 @@ def _reason(finding: Finding, better: Improved) -> str:
         return " The model is no better there with it, so it is left out."
     if better.worse is None or not finding.confirmed:
         return " The held-out recording does not bear it out: it is not in the model."
-    before, after = better.worse
-    name = "held" if "held" in after.worse(before, 0.0) else "filtered_held"
-    change = rise(getattr(before, name), getattr(after, name))
-    error = "force error" if name == "held" else "filtered force error"
+    name, change = _risen(*better.worse)
+    error = "filtered force error" if name.startswith("filtered") else "force error"
+    where = "there" if name.endswith("held") else "on this recording"
     return (
-        " The held-out recording shows it too, but the model with it is worse there: it takes the "
-        f"{error} from {change}. It is not in the model."
+        f" The held-out recording shows it too, but the model with it is worse {where}: it takes "
+        f"the {error} from {change}. It is not in the model."
     )
+
+
+def _risen(before: Errors, after: Errors) -> tuple[str, str]:
+    """The name of the figure that is worse by the largest factor, and how it rose."""
+
+    def factor(name: str) -> float:
+        times = getattr(after, name) / max(getattr(before, name), 1e-300)
+        return times if times == times else np.inf
+
+    name = max(after.worse(before, 0.0), key=factor)
+    return name, rise(getattr(before, name), getattr(after, name))
 
 
 def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> Finding:

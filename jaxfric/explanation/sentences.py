@@ -9,7 +9,7 @@ from ..simulators.columns import GAIN
 from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
-from .quantities import nil, quantity, turns
+from .quantities import UNSEEN, nil, quantity, turns
 
 NOWHERE = Extent()
 
@@ -43,10 +43,15 @@ def indistinct(rivals: Sequence[str]) -> str:
 
 
 def _words(effect: Effect, name: str, estimate: Estimate) -> str:
-    """A value in words; of a size that may be nil the most that it may be."""
+    """A value in words; of a size that may be nil the most that it may be.
+
+    Of another magnitude an interval down to zero says nothing, on a scale of ratios.
+    """
     most = float(estimate.interval()[1])
-    if name.startswith(effect.sizes) and nil(estimate):
+    if (name.startswith(effect.sizes) or name in effect.vanishes) and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
+    if name in effect.magnitudes and nil(estimate):
+        return UNSEEN
     if name in effect.periods:
         return quantity(estimate) + turns(estimate)
     return quantity(estimate)

@@ -97,7 +97,9 @@ def row(found: Identified, item: Item) -> Row:
     document = documents.identification(found)
     facts = {name: item.facts[name] for name in ("samples", "duration", "sample_rate")}
     kept = ("result", "projection", "windows", "covered", "filtered_force_error")
-    reason = "" if document["result"] == "successful" else document["diagnosis"]
+    # The severe ones are first.
+    texts = [document["diagnosis"], *(w["text"] for w in document["warnings"][:1] if w["severe"])]
+    reason = "" if document["result"] == "successful" else " ".join(texts)
     named = ", ".join(warning["name"] for warning in document["warnings"])
     circumstances = facts | {name: document[name] for name in kept}
     notes = " ".join(item.facts["notes"])

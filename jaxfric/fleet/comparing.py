@@ -7,6 +7,7 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from ..checks import LARGE
 from ..terms.friction import STRIBECK_VELOCITY
 from .files import File
 from .journal import Row
@@ -94,8 +95,8 @@ class _Values(NamedTuple):
 
 
 def compare(files: Sequence[File], rows: Mapping[str, Row]) -> Summary:
-    """Outliers and drifts of the recordings whose result is successful."""
-    fine = [f for f in files if rows[f.path]["result"] == "successful"]
+    """Outliers and drifts of the recordings whose result is successful and sound."""
+    fine = [f for f in files if sound(rows[f.path])]
     usual, outliers, tried = _outliers(_gathered(fine, rows, lambda file: file.group))
     axes = _gathered([f for f in fine if f.axis], rows, lambda file: file.axis)
     drifts = [_drift(axis, v) for axis, v in axes if len(v.files) >= FEWEST_OF_AXIS]
@@ -103,6 +104,18 @@ def compare(files: Sequence[File], rows: Mapping[str, Row]) -> Summary:
     drifts = [d._replace(chance=float(c)) for d, c in zip(drifts, chances, strict=True)]
     drifts.sort(key=lambda drift: drift.chance)
     return Summary(usual, outliers, tuple(drifts), (tried, len(drifts)))
+
+
+def sound(row: Row) -> bool:
+    """Whether a row says what its axis is like: successful, with most of the force explained, and
+    no friction negative beyond its interval.
+    """
+    warnings = (row.get("warnings") or "").split(", ")
+    return (
+        row["result"] == "successful"
+        and not {"large_error", "negative_parameter"} & set(warnings)
+        and not (row[FORCE_ERROR] or 0.0) > LARGE
+    )
 
 
 def _gathered(files, rows, of) -> list[tuple[str, _Values]]:

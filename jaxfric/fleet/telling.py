@@ -6,18 +6,24 @@ from collections.abc import Mapping, Sequence
 from ..data.printable import printable
 from ..identification import identified
 from ..looks.text import aligned
-from .comparing import FORCE_ERROR, LEVEL, Drift, Summary, Usual
+from .comparing import FORCE_ERROR, LARGE, LEVEL, Drift, Summary, Usual, sound
 from .files import File
 from .journal import Row
 
-# Lines of a list; the table has the others.
-MOST = 20
+# Lines of a list, and files of one; the table has the others.
+MOST, FIRST = 20, 3
 
 
 def summary(files: Sequence[File], rows: Mapping[str, Row], found: Summary) -> str:
     """Results, what is usual, outliers and drifts."""
     results = Counter(rows[file.path]["result"] for file in files)
     lines = [", ".join(f"{count} {result}" for result, count in results.most_common())]
+    fine = [file for file in files if rows[file.path]["result"] == "successful"]
+    if left := [file.path for file in fine if not sound(rows[file.path])]:
+        lines.append(
+            f"Not compared, for their force error is over {LARGE:.0%} or their friction negative: "
+            f"{_first(left)}"
+        )
     lines += _usual(found.usual) + _outliers(found) + _drifts(found)
     return "\n".join(lines)
 
@@ -29,20 +35,38 @@ def troubles(files: Sequence[File], rows: Mapping[str, Row]) -> str:
     results = dict.fromkeys(rows[file.path]["result"] for file in files)
     for result in results:
         if result not in ("successful", "failed"):
-            named = [printable(file.path) for file in files if rows[file.path]["result"] == result]
-            shown = ", ".join(named[:3]) + (f" and {len(named) - 3} more" if len(named) > 3 else "")
-            lines.append(f"{result}: {identified.Result[getattr(identified.Result, result)]}")
-            lines.append(f"  {shown}")
+            said = str(identified.Result[getattr(identified.Result, result)])
+            lines.append(f"{result}: {said}")
+            lines += _named([f for f in files if rows[f.path]["result"] == result], rows, said)
     return "\n".join(lines + _warned(files, rows))
 
 
+def _named(files: Sequence[File], rows: Mapping[str, Row], said: str) -> list[str]:
+    """The first files of a result, each with what its reason says beyond the result's words."""
+    own = [(rows[file.path].get("reason") or "").removeprefix(said).strip() for file in files]
+    if not any(own):
+        return [f"  {_first([file.path for file in files])}"]
+    shown = list(zip(files, own, strict=True))[:FIRST]
+    lines = [f"  {printable(file.path)}: {printable(text)}" for file, text in shown]
+    return lines + [f"  and {len(own) - FIRST} more"] * (len(own) > FIRST)
+
+
+def _first(paths: Sequence[str]) -> str:
+    """The first paths, and how many more there are."""
+    shown = ", ".join(map(printable, paths[:FIRST]))
+    return shown + (f" and {len(paths) - FIRST} more" if len(paths) > FIRST else "")
+
+
 def _warned(files: Sequence[File], rows: Mapping[str, Row]) -> list[str]:
-    """How many recordings each warning is about, and the first of them; its column has all."""
+    """How many recordings each warning is about, and the first of them; the table has all."""
     paths: dict[str, list[str]] = {}
     for file in files:
         for name in filter(None, (rows[file.path].get("warnings") or "").split(", ")):
-            paths.setdefault(name, []).append(printable(file.path))
-    return [f"warning {name}: {len(on)} recordings, {on[0]} first" for name, on in paths.items()]
+            paths.setdefault(name, []).append(file.path)
+    return [
+        f"warning {name}: {len(on)} recording{'s' * (len(on) > 1)}: {_first(on)}"
+        for name, on in paths.items()
+    ]
 
 
 def _usual(usual: Sequence[Usual]) -> list[str]:

@@ -21,6 +21,11 @@ from .breakaway import breakaway
 from .constant_velocity import constant_velocity
 from .uncertainty import Estimate
 
+SINGLE = (
+    "It ran in single precision, whose rounding may be why: switch on 64 bits before reading, "
+    'jax.config.update("jax_enable_x64", True).'
+)
+
 
 class Result(eqx.Enumeration):
     """Whether the parameters are determined; each member's text is the diagnosis and the remedy.
@@ -154,6 +159,8 @@ class Identified(eqx.Module):
             return f"{said} {float(self.filtered_force_error):.0%} of the force is left."
         if self.result_name == "ambiguous":
             return f"{said} The other one: {self._elsewhere()}."
+        if self.result_name == "not_converged" and self.model.alpha.dtype == jnp.float32:
+            return f"{said} {SINGLE}"
         if self.result_name == "on_border" and self.border is not None:
             return f"{said} On its border: {self._on_border()}."
         if self.result_name == "not_excited":

@@ -26,6 +26,7 @@ class _State(eqx.Module):
     best: _Point
     secant: Float[Array, "d d"]
     damping: Float[Array, ""]
+    flat: Bool[Array, ""]
     terminate: Bool[Array, ""]
 
 
@@ -119,7 +120,8 @@ class BoxNewton(optx.AbstractMinimiser):
 def _start(y) -> _State:
     none = jnp.zeros((y.shape[0], y.shape[0]), y.dtype)
     worst = _Point(y, jnp.asarray(jnp.inf, y.dtype), jnp.zeros_like(y), none)
-    return _State(worst, none, jnp.zeros((), y.dtype), jnp.zeros((), bool))
+    no = jnp.zeros((), bool)
+    return _State(worst, none, jnp.zeros((), y.dtype), no, no)
 
 
 def _next(here: _Point, secant, state: _State, options, solver):
@@ -138,7 +140,11 @@ def _next(here: _Point, secant, state: _State, options, solver):
     # NaN takes no part: the point stays, and the solve ends.
     trial = jnp.where(jnp.isfinite(trial), trial, best.place)
     small = solver.norm(trial - best.place) <= solver.atol + solver.rtol * solver.norm(here.place)
-    return trial, _State(best, secant, damping, small | (damping > 1e12))
+    # Twice in a row no step that the cost tells from its rounding: in double precision the second
+    # one is below the tolerance, in single precision none ever is.
+    flat = jnp.abs(best.gradient @ (trial - best.place)) <= rounding
+    done = small | (flat & state.flat) | (damping > 1e12)
+    return trial, _State(best, secant, damping, flat, done)
 
 
 def _rank_one(secant, before: _Point, after: _Point):

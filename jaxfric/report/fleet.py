@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..fleet.comparing import FORCE_ERROR, LEVEL, Drift, Summary
+from ..fleet.comparing import FORCE_ERROR, LEVEL, Drift, Summary, sound
 from ..fleet.files import File
 from ..fleet.journal import Row
 from ..identification.uncertainty import COSINES, student_quantile
@@ -28,7 +28,7 @@ def render(
 
     **Raises:** `ValueError` if matplotlib is not installed.
     """
-    fine = [file for file in files if rows[file.path]["result"] == "successful"]
+    fine = [file for file in files if sound(rows[file.path])]
     names = list(dict.fromkeys(one.name for one in found.usual if one.name != FORCE_ERROR))
     names += [FORCE_ERROR] * bool(found.usual)
     drifts = [drift for drift in found.drifts if drift.chance < LEVEL]
@@ -37,7 +37,7 @@ def render(
     count = len(names) + len(drifts)
     height = -(-count // ACROSS)
     picture = library()(figsize=(4.2 * ACROSS, 0.8 + 2.7 * max(1, height)), layout="constrained")
-    whole = f"{len(files)} recordings, {len(fine)} of them successful"
+    whole = f"{len(files)} recordings, {len(fine)} of them compared"
     picture.suptitle(f"{whole}; {told}")
     if count:
         panels = picture.subplots(max(1, height), ACROSS, squeeze=False)

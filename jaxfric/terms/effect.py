@@ -269,3 +269,11 @@ class Effect:
         """The names of its parameters that are periods over the position."""
         every = (p for term in self.shapes(ANY) for p in term.nonlinear)
         return frozenset(p.name for p in every if p.repeats and p.dimension == POSITION)
+
+    @property
+    def magnitudes(self) -> frozenset[str]:
+        """The names of its parameters that are positive, on a scale of ratios."""
+        terms = self.shapes(ANY)
+        shapes = {p.name for term in terms for p in term.nonlinear if p.logarithmic}
+        sizes = {p.name for term in terms for p in term.affine} if self.positive else set()
+        return frozenset(shapes | sizes)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from .interleaved import check_one_log
 from .pieces import GAP, begun, note, runs, some, spans, usual_step
 from .steady import on_a_steady_clock
 
@@ -24,6 +25,7 @@ def order(signals, segment, rows, notes, source) -> tuple[np.ndarray, np.ndarray
     note(notes, restart, rows, "where the clock restarts begin a new segment")
     segment = begun(segment, restart | gap)
     kept = {role: some(signal, keep) for role, signal in signals.items()}
+    check_one_log(kept, some(segment, keep), source)
     steady = on_a_steady_clock(kept, runs(some(segment, keep)), notes)
     check_runs(steady, some(segment, keep), source)
     if not keep.all():
@@ -44,6 +46,12 @@ def order(signals, segment, rows, notes, source) -> tuple[np.ndarray, np.ndarray
 def check_runs(time: np.ndarray, segment: np.ndarray, source: str) -> None:
     """Raises `ValueError` unless most stamps are later than the one before."""
     step = np.diff(time)[np.diff(segment) == 0]
+    if np.count_nonzero(step < 0) > 0.5 * len(step):
+        raise ValueError(
+            f"{source}: time runs backwards at {np.count_nonzero(step < 0)} of {len(step)} steps. "
+            "Turn the order of the rows round if the newest is first, or give another column: "
+            "--columns time=NAME."
+        )
     if not np.count_nonzero(step > 0) > 0.5 * len(step):
         fault = "does not change" if not step.any() else "does not increase"
         raise ValueError(

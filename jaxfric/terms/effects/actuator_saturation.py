@@ -81,7 +81,8 @@ ACTUATOR_SATURATION = Effect(
     "actuator_saturation",
     "c max(abs(f) − U, 0) sign(f), or c f (1/√(1 − (f/L)²) − 1)",
     "actuator",
-    "Above {knee} the actuator gives less than commanded: saturation, {saturation} of the excess",
+    "Above {knee} the actuator gives less than commanded: saturation, by {saturation} of the "
+    "excess",
     laws=(ActuatorSaturation, SoftSaturation),
     coordinates=("predicted_force",),
     needs=frozenset({"predicted_force"}),

@@ -265,6 +265,7 @@ COMPLIANCE = Effect(
     confusable_with=("transport_delay", "actuator_lag", "backlash", "presliding"),
     separate_by="Excite with a sweep up to the resonance, or measure on the load side.",
     positive=True,
+    sizes=("damping_ratio",),
     at_reversals=True,
     sharp=True,
     delays=True,
