@@ -140,9 +140,10 @@ def _next(here: _Point, secant, state: _State, options, solver):
     # NaN takes no part: the point stays, and the solve ends.
     trial = jnp.where(jnp.isfinite(trial), trial, best.place)
     small = solver.norm(trial - best.place) <= solver.atol + solver.rtol * solver.norm(here.place)
-    # Twice in a row no step that the cost tells from its rounding: in double precision the second
-    # one is below the tolerance, in single precision none ever is.
+    # In single precision no step ever is below the tolerance: twice in a row none that the cost
+    # tells from its rounding will do. In double precision that would leave a gradient.
     flat = jnp.abs(best.gradient @ (trial - best.place)) <= rounding
+    flat &= trial.dtype == jnp.float32
     done = small | (flat & state.flat) | (damping > 1e12)
     return trial, _State(best, secant, damping, flat, done)
 
