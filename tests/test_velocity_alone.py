@@ -8,6 +8,10 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import signals
+from jaxfric.explanation import inputs, zero
+from jaxfric.explanation.evidence import gather
+from jaxfric.explanation.motion import motion_of
+from jaxfric.explanation.regression import fit
 
 PITCH, AMPLITUDE = 0.012, 0.8
 LAW = {"inertia": 2.0, "coulomb": 3.0, "viscous": 4.0}
@@ -79,6 +83,46 @@ def test_cogging_is_explained_without_a_position_and_confirmed_from_another_star
     assert any(each["name"] == "position_integrated" for each in found.warnings)
     ours = jf.predict(found.model, log(0.3, 1))
     assert jnp.isfinite(ours).all()
+
+
+def with_position(given: jf.Recording, start: float) -> jf.Recording:
+    return dataclasses.replace(given, position=signals.placed(given).position + start)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("which", ["recording", "holdout"])
+def test_one_of_two_recordings_has_a_position(which):
+    here, there = log(0.3, 1), log(0.2041, 2)
+    if which == "recording":
+        here = with_position(here, 0.7)
+    else:
+        there = with_position(there, 0.7)
+    found = jf.explain(here, holdout=there)
+    assert [each.effect for each in found.findings] == ["cogging"] and found.findings[0].confirmed
+    held = found.fit["holdout_force_error"]
+    assert held["after"] < 0.1 * held["before"]
+    assert any(each["name"] == "position_integrated" for each in found.warnings)
+
+
+def test_where_one_recording_has_a_gap_neither_is_integrated():
+    here, there = log(0.3, 1), log(0.2041, 2)
+    gap = dataclasses.replace(there, time=np.asarray(there.time) + (np.arange(6000) > 3000))
+    assert all(
+        each is given for each, given in zip(inputs._placed(here, gap), (here, gap), strict=True)
+    )
+    assert all(each.position is not None for each in inputs._placed(here, there))
+
+
+def test_a_wave_of_several_harmonics_is_sought_over_its_whole_period():
+    given = log(0.3, 1)
+    seen = gather(motion_of(signals.placed(given)))
+    term = jf.terms.Cogging(harmonics=3)
+    model = fit([term], seen, [np.array([PITCH])])
+    places = zero._places(model, seen, seen)
+    assert places[0] == 0 and places[-1] == pytest.approx(float(model.betas[0][0]))
+    model = fit([term, jf.terms.Spring()], seen, [np.array([PITCH]), np.zeros(0)])
+    places = zero._places(model, seen, seen)
+    assert places[-1] - places[0] == pytest.approx(2 * (seen.limits.high - seen.limits.low))
 
 
 def test_friction_alone_needs_no_word_of_a_position():

@@ -89,7 +89,7 @@ def prepare(
     recording, baseline, holdout, fixed = _beside(recording, baseline, holdout, fixed)
     if isinstance(baseline, Earlier):
         baseline = baseline.recording
-    recording, baseline, holdout = map(_placed, (recording, baseline, holdout))
+    recording, baseline, holdout = _placed(recording, baseline, holdout)
     if not isinstance(baseline, Recording):
         baseline_of(baseline)
     figures = Figures(recording, holdout, jnp.zeros(()).dtype == jnp.float64)
@@ -195,9 +195,13 @@ def interpolated(recording: Recording) -> tuple[Recording, list[Remark]]:
     return curve, remarks
 
 
-def _placed(given: Any) -> Any:
-    """Of a recording of velocity alone, the one with the velocity's integral as its position."""
-    return signals.placed(given) if isinstance(given, Recording) else given
+def _placed(*given: Any) -> tuple[Any, ...]:
+    """Recordings of velocity alone with its integral as their position; none of them where that is
+    not known of each, since what is found over position could not be looked for there.
+    """
+    found = tuple(signals.placed(g) if isinstance(g, Recording) else g for g in given)
+    lacking = any(isinstance(each, Recording) and each.position is None for each in found)
+    return given if lacking else found
 
 
 # What is said of lone samples in other words, as they are left out here.

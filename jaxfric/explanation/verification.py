@@ -97,6 +97,11 @@ def carried(current: Fit, evidence: Evidence, rephased: frozenset[int] = frozens
     )
 
 
+# So many durations before a recording every ramp is over that began then: it takes a quarter of
+# the other recording at most.
+LONG_AGO = 1e3
+
+
 def changed_before(current: Fit, evidence: Evidence) -> Fit | None:
     """A fit whose changes at a moment are over when another recording begins; `None` without any.
 
@@ -105,7 +110,7 @@ def changed_before(current: Fit, evidence: Evidence) -> Fit | None:
     dates = [traits(term).moment if i else "" for i, term in enumerate(current.terms)]
     if not any(dates):
         return None
-    before = evidence.limits.start - 4 * evidence.limits.duration
+    before = evidence.limits.start - LONG_AGO * evidence.limits.duration
     betas = list(current.betas)
     for i, (term, date) in enumerate(zip(current.terms, dates, strict=True)):
         own = np.array([p.name == date for p in term.nonlinear], bool)

@@ -1,4 +1,4 @@
-"""Where the position of a held-out recording begins that is the integral of its velocity."""
+"""The zero of a held-out recording's position, where one position is the integral of a velocity."""
 
 import dataclasses
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from ..checks import Remark
 from ..identification.uncertainty import Estimate
-from ..terms.base import AbstractTerm
 from ..units import POSITION, spell
 from . import verification
 from .evidence import Evidence
@@ -16,22 +15,23 @@ from .problem import with_holdout
 from .quantities import quantity
 from .regression import Fit
 
-# Places that are tried: so many in the shortest wave, whose minimum is half as wide, and at most so
-# many; then around the best, four times as fine each time.
-IN_A_WAVE, MOST = 8, 512
+# Places that are tried: eight in the shortest wave, whose minimum is half as wide, 64 at least, and
+# so many at most that they take some seconds; then around the best, four times as fine each time,
+# until 1/2000 of the shortest wave.
+IN_A_WAVE, FEWEST, MOST = 8, 64, 512
 FINER, ROUNDS = 4, 4
 
 
 def zero_of(findings: Findings, holdout: Motion) -> float | None:
-    """The position at which a held-out recording without one begins, m; `None` where no finding
-    reads it, or where it is recorded.
+    """Where the zero of a held-out recording lies in the recording, m; `None` where the position of
+    both is recorded, or where no term reads it.
 
-    Each such recording counts from its own beginning. Where that is on the axis is the place at
-    which the model leaves least; nothing else is fitted.
+    An integral counts from its own beginning. Where that is on the axis is the place at which the
+    model leaves least; nothing else is fitted.
     """
     problem, selection = findings.undelayed
-    placed = [t for t in selection.last.terms if "position" in t.coordinates]
-    if holdout.recording.position_every != 0 or not placed:
+    recorded = problem.evidence.located and holdout.recording.position_every != 0
+    if recorded or not _read(selection.last):
         return None
     held = with_holdout(problem, holdout).held
     assert held is not None
@@ -48,26 +48,31 @@ def zero_of(findings: Findings, holdout: Motion) -> float | None:
 
 
 def _places(model: Fit, evidence: Evidence, held: Evidence) -> np.ndarray:
-    """Every place, m, where the strokes of both recordings overlap; of waves alone one period."""
-    own = [_periods(term, beta) for term, beta in zip(model.terms, model.betas, strict=True)]
-    waves = [period for periods in own for period in periods]
-    read = [periods for t, periods in zip(model.terms, own, strict=True) if _reads(t)]
+    """Places, m, at which the strokes of both recordings overlap; of one wave alone its period."""
     low, high = evidence.limits.low - held.limits.high, evidence.limits.high - held.limits.low
-    if all(read):
-        low, high = 0.0, max(waves)
-    fine = (high - low) * IN_A_WAVE / min(waves) if waves else 0
-    return np.linspace(low, high, int(np.clip(fine, MOST / 8, MOST)) + 1)
+    read = _read(model)
+    waves = [n for n in read if verification.wavelike(model, n)]
+    periods = [_period(model, n) for n in waves]
+    if len(read) == len(waves) == 1:
+        low, high = 0.0, periods[0]
+    shortest = [
+        period / (len(model.terms[n].affine) // 2) for n, period in zip(waves, periods, strict=True)
+    ]
+    fine = (high - low) * IN_A_WAVE / min(shortest) if shortest else 0.0
+    return np.linspace(low, high, int(np.clip(fine, FEWEST, MOST)) + 1)
 
 
-def _reads(term: AbstractTerm) -> bool:
-    return "position" in term.coordinates
+def _read(model: Fit) -> list[int]:
+    """The numbers of the terms that read the position."""
+    return [n for n, term in enumerate(model.terms) if "position" in term.coordinates]
 
 
-def _periods(term: AbstractTerm, beta: np.ndarray) -> list[float]:
-    """The shortest waves over position of a term, m, by its parameters; none of another."""
-    pairs = zip(term.nonlinear, beta, strict=True)
-    found = [float(p.period(b)) for p, b in pairs if p.repeats and p.dimension == POSITION]
-    return [each / max(1, len(term.affine) // 2) for each in found]
+def _period(model: Fit, number: int) -> float:
+    """The period of a wave over position, m."""
+    term, beta = model.terms[number], model.betas[number]
+    values = {p.name: float(b) for p, b in zip(term.nonlinear, beta, strict=True)}
+    low, high = term.extent(values)["position"]
+    return high - low
 
 
 def _error(model: Fit, held: Evidence, place: float) -> float:
@@ -90,15 +95,17 @@ def integrated(findings: Findings, place: float | None) -> list[Remark]:
     """That positions are integrals of the velocity, where a term reads them; `place`, of
     [`zero_of`][].
     """
-    selection, evidence = findings.selection, findings.problem.evidence
-    if evidence.located or not any(map(_reads, selection.last.terms)):
+    evidence = findings.problem.evidence
+    if not _read(findings.selection.last) or (evidence.located and place is None):
         return []
     text = (
         "No position is recorded: it is the integral of the velocity, zero where the recording "
         "begins. An offset of the velocity lets it drift."
     )
+    if evidence.located:
+        text = "On the held-out recording the position is the integral of the velocity."
     if place is not None:
         unit = spell(POSITION, evidence.motion.unit_names)
         spelt = quantity(Estimate(np.float64(place), np.float64(0.0), unit))
-        text += f" The held-out recording begins at {spelt}, where the model fits it best."
+        text += f" The held-out recording's zero lies at {spelt}, where the model fits it best."
     return [Remark("position_integrated", text, False)]
