@@ -115,20 +115,20 @@ def _surely(more, known, begins, ends):
     """Where `more` is no noise: samples so far from the ends of the stretches at which its mean
     over all stretches is surely not zero, `(N,)`. Chosen sample by sample it would be noise.
     """
-    index = jnp.arange(more.size)
-    begun = index - jax.lax.cummax(jnp.where(begins, index, 0))
-    left = jax.lax.cummin(jnp.where(ends, index, more.size - 1), reverse=True) - index
 
-    def beside(apart):
-        here = (apart[None, :] == jnp.arange(BESIDE)[:, None]) & known[None, :]
-        count = jnp.maximum(jnp.sum(here, axis=1), 1).astype(more.dtype)
-        mean = jnp.sum(jnp.where(here, more[None, :], 0.0), axis=1) / count
-        apart_from = jnp.where(here, more[None, :] - mean[:, None], 0.0)
-        error = jnp.sqrt(jnp.sum(apart_from**2, axis=1)) / count
-        sure = (jnp.abs(mean) > SURE * error) & (count >= FEWEST)
-        return jnp.any(here & sure[:, None], axis=0)
+    def beside(edge, inwards: int):
+        def further(state, _):
+            place, chosen = state
+            here = place & known
+            count = jnp.maximum(jnp.sum(here), 1).astype(more.dtype)
+            mean = jnp.sum(jnp.where(here, more, 0.0)) / count
+            error = jnp.sqrt(jnp.sum(jnp.where(here, more - mean, 0.0) ** 2)) / count
+            sure = (jnp.abs(mean) > SURE * error) & (count >= FEWEST)
+            return (jnp.roll(place, inwards) & ~edge, chosen | (here & sure)), None
 
-    return beside(begun) | beside(left)
+        return jax.lax.scan(further, (edge, jnp.zeros_like(edge)), None, length=BESIDE)[0][1]
+
+    return beside(begins, 1) | beside(ends, -1)
 
 
 class Solved(NamedTuple):
