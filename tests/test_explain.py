@@ -987,6 +987,19 @@ def test_a_size_that_other_terms_could_stand_in_for_is_told_as_a_bound():
     assert "by 1.20 N ± 0.23 N" in told(0.1)
 
 
+@pytest.mark.slow
+def test_a_spring_that_is_met_before_the_middle_is_no_sum_of_waves(healthy):
+    low, high = (float(f(healthy[0].position)) for f in (np.min, np.max))
+    place = low + 0.35 * (high - low)
+    sprung = [planted(each, terms.EndStop(), (400.0,), (place,)) for each in healthy]
+    found = explain(sprung[0], "gaussian", sprung[1])
+    (stop,) = found.findings
+    assert (stop.effect, found.verdict) == ("end_stop", "explained")
+    assert "too soft for an end stop" in stop.sentence
+    assert stop.parameters["stop_position"].value == pytest.approx(place, abs=0.005 * (high - low))
+    assert stop.parameters["stop_stiffness"].value == pytest.approx(400.0, rel=0.02)
+
+
 def test_what_is_wrong_with_both_recordings_is_said_once():
     late = [Remark("velocity_late", f"The velocity is {t} s late.", False) for t in (2e-3, 1.9e-05)]
     other = Remark("clipped", "The force is clipped at 3 N.", False)

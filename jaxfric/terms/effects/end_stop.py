@@ -5,26 +5,26 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...units import POSITION, STIFFNESS
-from ..base import AbstractLaw
-from ..effect import Effect, Extent
+from ..base import AbstractLaw, AbstractTerm
+from ..effect import GRID, Effect, Extent, View
 from ..position import POSITION_ONLY, stroke
 from ..sample import UNKNOWN, Parameter, Sample
 
+# In parts of the stroke, how much of it a stop may act over. Of less, fewer samples than a fit
+# needs would touch it; of more, all but a tenth of its force is a straight spring's.
+_LEAST, _MOST = 0.02, 0.85
+
 
 def _upper(scales):
-    """In the upper half of the stroke: what presses over more of it is a spring, and no stop.
-
-    Not in the outermost 2 %, where fewer samples than a fit needs would touch it.
-    """
-    return scales.high - 0.5 * stroke(scales), scales.high - 0.02 * stroke(scales)
+    return scales.high - _MOST * stroke(scales), scales.high - _LEAST * stroke(scales)
 
 
 def _lower(scales):
-    """In the lower half of the stroke, likewise."""
-    return scales.low + 0.02 * stroke(scales), scales.low + 0.5 * stroke(scales)
+    return scales.low + _LEAST * stroke(scales), scales.low + _MOST * stroke(scales)
 
 
 class EndStop(AbstractLaw):
@@ -87,9 +87,17 @@ def soft(values: Mapping[str, float], extent: Extent) -> str | None:
     if not reach > most * extent.stroke:
         return END_STOP.sentence.replace("{", f"{{{side}")
     return (
-        f"Towards the end of the stroke a force rises slowly, from {{{side}stop_position}} on by "
-        f"{{{side}stop_stiffness}}: a slow variation along the stroke, too soft for an end stop"
+        f"From {{{side}stop_position}} to the end, over much of the stroke, a force grows by "
+        f"{{{side}stop_stiffness}}: a spring, a cable or a bellows that begins to pull there, too "
+        "soft for an end stop"
     )
+
+
+def _places(term: AbstractTerm, view: View) -> np.ndarray:
+    """Places as finely as they are near the end: what they differ by is of the way to it."""
+    limits = view.limits
+    way = (limits.high - limits.low) * np.geomspace(_LEAST, _MOST, GRID)
+    return (limits.low + way if isinstance(term, LowerEndStop) else limits.high - way)[:, None]
 
 
 END_STOP = Effect(
@@ -105,5 +113,6 @@ END_STOP = Effect(
     separate_by="Turn the motion round shortly before the suspected stop.",
     positive=True,
     several=True,
+    grid=_places,
     variant=soft,
 )
