@@ -82,7 +82,7 @@ CASES = {
     ),
 }  # fmt: skip
 TERMS = {name: term for name, (term, _) in CASES.items()}
-SCALES = Scales(*(jnp.asarray(x) for x in (0.001, 0.2, -0.04, 0.04, 20.0, 0.0, 12.0, 1e-3)))
+SCALES = Scales(*(jnp.asarray(x) for x in (0.001, 0.2, -0.04, 0.04, 20.0, 0.0, 12.0, 1e-3, 60.0)))
 
 each_term = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)
 each_case = pytest.mark.parametrize(("term", "alpha"), CASES.values(), ids=CASES)

@@ -24,8 +24,8 @@ lengths = st.floats(-6.0, 3.0).map(lambda x: 10.0**x)
 
 
 def limits(stroke=0.1, speed=0.2, interval=1e-3, duration=20.0):
-    numbers = (0.006 * speed, speed, -0.3 * stroke, 0.7 * stroke, 20.0, 5.0, duration, interval)
-    return Scales(*(np.asarray(x) for x in numbers))
+    numbers = (0.006 * speed, speed, -0.3 * stroke, 0.7 * stroke, 20.0, 5.0, duration)
+    return Scales(*(np.asarray(x) for x in (*numbers, interval, 60.0)))
 
 
 def grid_of(term, scales, half_width=None, given=None):

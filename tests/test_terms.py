@@ -45,7 +45,7 @@ CASES = {
     "directional": Directional(Coulomb() + Gaussian(0.3), Coulomb() + Lorentzian(0.2)),
     "nested": Inertia() + Directional(Coulomb() + Viscous() + Generalised(0.3, 1.4)) + Offset(),
 }
-SCALES = Scales(*(jnp.asarray(x) for x in (0.01, 2.0, -1.0, 1.0, 5.0, 0.0, 10.0, 1e-3)))
+SCALES = Scales(*(jnp.asarray(x) for x in (0.01, 2.0, -1.0, 1.0, 5.0, 0.0, 10.0, 1e-3, 15.0)))
 
 each_term = pytest.mark.parametrize("term", CASES.values(), ids=CASES)
 

@@ -29,8 +29,9 @@ def simplest(best: Finalist, round_: Contest) -> Finalist:
 
 
 # Effects whose force is the same but for 5 % cannot be told apart: between them only noise decides,
-# which is never quite as assumed.
-ALIKE = 0.95
+# which is never quite as assumed. But one that leaves more than twice as much as the other, four
+# times its energy, has been told from it: what it leaves is no noise.
+ALIKE, TOLD = 0.95, 4.0
 
 
 def with_rivals(
@@ -53,6 +54,7 @@ def with_rivals(
         theirs = theirs - basis @ (basis.T @ theirs)
         size = np.linalg.norm(force) * np.linalg.norm(theirs)
         same = size > 0 and abs(force @ theirs) > ALIKE * size
+        same = same and other.energy <= TOLD * best.energy
         # The remainder of a term that is but the first order of its effect is no evidence, neither
         # against significant effects that it is known to be confused with nor against itself.
         effect, rival = best.effect, other.effect

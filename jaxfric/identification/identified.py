@@ -37,8 +37,9 @@ class Result(eqx.Enumeration):
     successful = "The parameters were identified."
     on_border = (
         "The cost is least on the border of a nonlinear parameter's bounds, so that this parameter "
-        "is not determined. Excite slower motion (the Stribeck velocity must lie well inside the "
-        "speeds that the axis slips at), give bounds, or use a model without the bump."
+        "is not determined. Give other bounds, or use a model without the term that it belongs to; "
+        "for a Stribeck velocity excite slower motion too, as it must lie well inside the speeds "
+        "that the axis slips at."
     )
     not_converged = (
         "The refinement stopped before it converged; the parameters are those of the best point "

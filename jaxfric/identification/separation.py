@@ -221,7 +221,7 @@ def _scales(limits: Limits) -> Scales:
     slowest = signals.SLIP_SHARE * limits.velocity
     low, high = limits.centre - limits.position, limits.centre + limits.position
     values = (slowest, limits.velocity, low, high, 1.0, 0.0, limits.duration, limits.interval)
-    return Scales(*(jnp.asarray(x, float) for x in values))
+    return Scales(*(jnp.asarray(x, float) for x in (*values, 2.0)))
 
 
 def _places(term: AbstractTerm, scales: Scales) -> Float[Array, "G d"]:

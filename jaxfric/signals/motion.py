@@ -112,10 +112,11 @@ def scales(recording: Recording) -> Scales:
     inside = jnp.where(valid, position, jnp.nan)
     time = jnp.where(valid, recording.time, jnp.nan)
     count = jnp.maximum(jnp.sum(valid), 1).astype(speed.dtype)
-    force = jnp.sqrt(jnp.sum(jnp.where(valid, recording.force, 0.0) ** 2) / count)
+    sizes = jnp.where(valid, jnp.abs(recording.force), 0.0)
+    force, peak = jnp.sqrt(jnp.sum(sizes**2) / count), jnp.max(sizes)
     start, end = jnp.nanmin(time), jnp.nanmax(time)
     low, high = jnp.nanmin(inside), jnp.nanmax(inside)
-    return Scales(slowest, fastest, low, high, force, start, end - start, typical)
+    return Scales(slowest, fastest, low, high, force, start, end - start, typical, peak)
 
 
 def host_scales(recording: Recording) -> tuple[Scales, np.ndarray]:
@@ -128,9 +129,9 @@ def host_scales(recording: Recording) -> tuple[Scales, np.ndarray]:
     place = velocity if recording.position is None else np.asarray(recording.position)
     low, high = (_of_numbers(place[valid], end) for end in (np.min, np.max))
     start, end = (_of_numbers(np.asarray(recording.time)[valid], end) for end in (np.min, np.max))
-    square = np.sum(np.asarray(recording.force)[valid] ** 2)
-    force = np.sqrt(square / max(np.count_nonzero(valid), 1))
-    found = (slowest, fastest, low, high, force, start, end - start, typical, noise)
+    sizes = np.abs(np.asarray(recording.force)[valid])
+    force, peak = np.sqrt(np.sum(sizes**2) / max(sizes.size, 1)), np.max(sizes, initial=0.0)
+    found = (slowest, fastest, low, high, force, start, end - start, typical, peak, noise)
     *magnitudes, deviation = (np.asarray(each, velocity.dtype) for each in found)
     return Scales(*magnitudes), deviation
 

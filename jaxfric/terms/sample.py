@@ -48,7 +48,7 @@ class Scales(NamedTuple):
     `slowest`: the smallest speed resolved as slip, m/s. `fastest`: the 98 % quantile of the
     speed, m/s. `low`, `high`: the range of the position, m. `force`: root mean square, N.
     `start`: the first time stamp, s. `duration`: s. `interval`: the typical sampling interval, s.
-    All scalars.
+    `peak`: the largest force of either sign, N. All scalars.
     """
 
     slowest: Float[Array, ""]
@@ -59,6 +59,7 @@ class Scales(NamedTuple):
     start: Float[Array, ""]
     duration: Float[Array, ""]
     interval: Float[Array, ""]
+    peak: Float[Array, ""]
 
 
 class Burden(NamedTuple):

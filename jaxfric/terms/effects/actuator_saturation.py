@@ -15,12 +15,10 @@ from ..text import literal
 
 
 def _knee_bounds(scales):
-    """A half to three times the root-mean-square force.
-
-    Below, most samples lie beyond the knee and the law is a gain plus a dead-band; three times
-    the root mean square is the peak of all but the most impulsive duty.
+    """From half the root-mean-square force, below which most samples lie beyond the knee and the law
+    is a gain plus a dead-band, to the peak: of short moves between long dwells that is many times it.
     """
-    return 0.5 * scales.force, 3 * scales.force
+    return 0.5 * scales.force, scales.peak
 
 
 class ActuatorSaturation(AbstractLaw):
@@ -45,10 +43,10 @@ class ActuatorSaturation(AbstractLaw):
 
 
 def _level_bounds(scales):
-    """From the root-mean-square force, the peak of a square wave, to five times as much: there a
-    peak of twice that is two fifths of the level, and the law a cubic to a tenth.
+    """From the root-mean-square force, the peak of a square wave, to two and a half times the peak:
+    there the law is a cubic to a tenth.
     """
-    return scales.force, 5 * scales.force
+    return scales.force, 2.5 * scales.peak
 
 
 # So far, in parts of the level, and no further: beyond, a command five times as large is straight.

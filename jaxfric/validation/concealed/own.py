@@ -81,4 +81,4 @@ def _scales(n: Nominal) -> Scales:
     """What a recording of the motion says about magnitudes."""
     interval = float(np.median(np.diff(n.time)))
     numbers = (1e-2 * n.top, n.top, n.x.min(), n.x.max(), rms(n.u), n.time[0], np.ptp(n.time))
-    return Scales(*(jnp.asarray(float(value)) for value in (*numbers, interval)))
+    return Scales(*(jnp.asarray(float(value)) for value in (*numbers, interval, np.abs(n.u).max())))
