@@ -110,9 +110,9 @@ def _others(robot: Bodies, state: State) -> list[str]:
 
 
 def _sure(robot: Bodies, state: State) -> bool:
-    """Whether each number of a state differs from the simulator's beyond noise."""
+    """Whether each number of a state differs beyond noise from what it would be without it."""
     return all(
-        abs(float(e.value) - robot.before[name]) > SURE * float(e.standard_error)
+        abs(float(e.value) - robot.unchanged(name, state)) > SURE * float(e.standard_error)
         for name, e in robot.estimates(state).items()
     )
 

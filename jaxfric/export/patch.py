@@ -163,6 +163,10 @@ def _confirmed(
     return kept(able, error)
 
 
+# Kinds of values that every joint feels.
+SHARED = ("body/", "option/")
+
+
 def _without_harm(
     source, done: Patched, values, found, recordings, models
 ) -> tuple[Patched, dict[str, dict[str, Any]]]:
@@ -173,7 +177,7 @@ def _without_harm(
     for own in (False, True):
         joints = [joint for joint, each in errors.items() if worse(each)]
         mine = {key for joint in joints for key in _moved(found[joint])}
-        harm = [k for k in done.written if (k in mine if own else k.startswith("body/"))]
+        harm = [k for k in done.written if (k in mine if own else k.startswith(SHARED))]
         if not joints or not harm:
             continue
         said = [f"joint {joint} would be worse: {from_to(errors[joint])}" for joint in joints]
