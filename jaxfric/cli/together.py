@@ -88,6 +88,7 @@ def _joined(first: Joint, new: Joint, agreement: Agreement, names: Sequence[str]
     """A joint explained again, with what all say of its bodies before it."""
     if new.told is None or first.told is None:
         return first
-    if not _moves(first, agreement):
+    unmoved = first.told.verdict == new.told.verdict == "consistent"
+    if unmoved or not _moves(first, agreement):
         return new
     return new._replace(told=with_bodies(new.told, first.told, agreement, names))

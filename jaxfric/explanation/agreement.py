@@ -28,6 +28,8 @@ from .joint_rows import joint_rows
 from .quantities import quantity
 from .sanity.preceding import p_value, with_preceding
 
+# The numbers of a part that is bolted to a body.
+MASS_AND_CENTRE = 4
 # A base is set up to a tenth of a degree.
 STRAIGHT = 0.1
 
@@ -172,7 +174,9 @@ def _text(
             alike = dict.fromkeys(_said(other, rows, own) for other in others)
             text += f" (or {listed(list(alike), 'others')}: these motions cannot tell them apart)"
         texts.append(text)
-    return "; ".join([*texts, *_turned(moved, rows), *_raised(moved, rows)])
+    return "; ".join(
+        [*texts, *_turned(moved, rows), *_raised(moved, rows), *_geometry(moved, rows)]
+    )
 
 
 def _value(name: str, rows: Bodies) -> str:
@@ -197,7 +201,8 @@ def _turned(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
     text = f"gravity is {sizes[1]:.4g} m/s²"
     if angle < STRAIGHT:
         return [f"{text} and of the same direction"]
-    return [f"{text} and {angle:.2g}° from the file's direction: the base is tilted"]
+    how = "is tilted" if angle < 45 else "is mounted another way"
+    return [f"{text} and {angle:.3g}° from the file's direction: the base {how}"]
 
 
 def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -> str:
@@ -215,6 +220,19 @@ def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -
         if key == GAIN and own[joint][key].what == GAIN
         else str(own[joint][key])
     )
+
+
+def _geometry(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
+    """A doubt where more numbers of several bodies differ than a part that is added explains: the
+    mass and the centre of one body are four.
+    """
+    bodies = dict.fromkeys(rows.owner[name][0] for name in moved if name in rows.owner)
+    if len(bodies) < 2 or len(moved) <= MASS_AND_CENTRE:
+        return []
+    return [
+        f"that is {len(moved)} numbers of {len(bodies)} bodies: look first at the file's geometry "
+        "(lengths of links, axes, couplings of joints), which is not among what is asked"
+    ]
 
 
 def _raised(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
