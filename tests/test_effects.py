@@ -45,7 +45,7 @@ CASES = {
     "reaction_friction": (T.ReactionFriction(), (0.1,)),
     "recorded_load": (T.LoadDependentFriction("load"), (0.1,)),
     "cross_axis": (T.CrossAxis(), (0.5, 8.0)),
-    "named_cross_axis": (T.CrossAxis("known_velocity m x", "x"), (0.5, 8.0)),
+    "named_cross_axis": (T.CrossAxis(("x", "m")), (0.5, 8.0)),
     "deadband": (T.ActuatorDeadband(), (1.5,)),
     "saturation": (T.ActuatorSaturation(25.0), (0.2,)),
     "soft_saturation": (T.SoftSaturation(45.0), (0.8,)),

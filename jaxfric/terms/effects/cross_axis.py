@@ -29,18 +29,23 @@ class CrossAxis(AbstractLaw):
     Needs that axis' velocity as a channel; its acceleration is never formed, the weak form
     differentiates the kernel instead.
 
-    **Arguments:** `channel`; `neighbour`, the name of that axis where there are several; `spelled`,
-    the units of C and h where that axis turns and this one does not, or the other way round.
+    **Arguments:** `neighbour`, the name of that axis and the unit of its position, m or rad, where
+    there are several; `spelled`, the units of C and h where that axis turns and this one does not,
+    or the other way round.
     """
 
-    channel: str = eqx.field(static=True, default=NEIGHBOUR)
-    neighbour: str = eqx.field(static=True, default="")
+    neighbour: tuple[str, ...] = eqx.field(static=True, default=(), converter=tuple)
     spelled: tuple[str, ...] = eqx.field(static=True, default=(), converter=tuple)
+
+    @property
+    def channel(self) -> str:
+        """The channel of that axis' velocity."""
+        return neighbour_channel(*self.neighbour) if self.neighbour else NEIGHBOUR
 
     @property
     def affine(self):
         units = self.spelled or (INERTIA, DAMPING)
-        end = f"_{self.neighbour}" if self.neighbour else ""
+        end = f"_{self.neighbour[0]}" if self.neighbour else ""
         return (Parameter(MASS + end, units[0]), Parameter(DRAG + end, units[1]))
 
     @property
@@ -64,7 +69,7 @@ def _neighbours(recording: Recording) -> tuple[CrossAxis, ...]:
         if channel.startswith(NEIGHBOURS):
             unit, _, name = channel.removeprefix(NEIGHBOURS).partition(" ")
             spelled = () if unit == own else (f"{force}·s²/{unit}", f"{force}·s/{unit}")
-            found.append(CrossAxis(channel, name, spelled))
+            found.append(CrossAxis((name, unit), spelled))
     return tuple(found)
 
 
