@@ -187,6 +187,22 @@ def test_columns_of_another_joint(motion):
     assert shoulder.wrong is None and "one column for two joints" in elbow.wrong
 
 
+def test_forces_are_swapped_on_a_robot_that_pauses(motion):
+    """At rest nothing is compared, and nodes there have no time."""
+    time, position, _ = motion
+    way = np.cumsum((time > 1.5) & (np.abs(time - 7) > 0.6)) * (time[1] - time[0])
+    way = np.convolve(np.pad(way, 200, mode="edge"), np.hanning(401) / 200, mode="valid")
+    stopping = np.stack([np.interp(way, time, place) for place in position.T], axis=1)
+    speed = np.gradient(stopping, time, axis=0)
+    force = needed(ARM, stopping, speed, np.gradient(speed, time, axis=0))
+    for each in check_logs(parts(time, stopping, force)):
+        assert "columns" not in wrong(each) and each.wrong is None
+    swapped = check_logs(parts(time, stopping, force[:, ::-1]))
+    for each, other in zip(swapped, JOINTS[::-1], strict=True):
+        assert f"is that of joint {other} in the simulator" in each.wrong
+        assert "shoulder_force=NAME,elbow_force=NAME" in each.wrong
+
+
 def test_angles_in_degrees_and_columns_of_whole_joints_that_are_swapped(motion):
     time, position, force = motion
     for each in check_logs(parts(time, np.rad2deg(position), force)):

@@ -9,8 +9,8 @@ from ..data.joints import COMMAND, ROLES, columns_of, mentioned, unclaimed, unkn
 from ..data.tables import load
 
 Columns = dict[str, dict[str, str]]
-# What is said of a log as a whole.
-WHOLE = ("time", "segment")
+# What is said of a log as a whole; the velocity of an axis that is no joint of the model.
+WHOLE = ("time", "segment", "neighbour_velocity")
 
 
 class Logged(NamedTuple):

@@ -94,7 +94,7 @@ def columns(command: ArgumentParser):
         default={},
         metavar="ROLE=NAME,…",
         help="for instance force=vir,position=qm; a name with a comma in quotation marks; "
-        "neighbour_velocity=v2 for an axis beside it",
+        "neighbour_velocity=v2 for an axis beside it (not needed for joints of a robot)",
     )
     group.add_argument(
         "--scale",

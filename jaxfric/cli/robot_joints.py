@@ -16,7 +16,7 @@ from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs, rows
 from ..simulators import Mujoco
 from ..simulators.patching import folder_of
 from .commands import read
-from .joint_columns import Logged
+from .joint_columns import WHOLE, Logged
 from .messages import message
 
 # What the log of one joint gives no role to.
@@ -170,7 +170,7 @@ def _log(
     wanted = references_of(load(Path(path)).columns, list(own), arguments.columns)
     if name in wanted:
         roles["reference"] = wanted[name]
-    for role in ("time", "segment"):
+    for role in WHOLE:
         if role in arguments.columns:
             roles[role] = arguments.columns[role]
     if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:

@@ -192,9 +192,10 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
 
     found: list[Candidate] = []
     for effect in EFFECTS.values():
-        if effect.needs - have or (effect.momentary and not evidence.clock):
+        if effect.momentary and not evidence.clock:
             continue
-        for term in effect.shapes(seen.limits):
+        own = () if effect.needs - have else effect.shapes(seen.limits)
+        for term in (*own, *effect.recorded(evidence.motion)):
             if term.coordinates & CHANNELS - have:
                 continue
             for suited in filter(shows, effect.suited(term, base, turn)):

@@ -276,12 +276,11 @@ def without_levels(model: Model) -> list[str]:
 
 def left_out(model: Model, part: Part) -> str:
     """Why a text holds a part not, and what to do instead."""
-    units, values = dict(model.units), model.parameters
-    if any(name.startswith(KNOWN) for name in part.term.coordinates):
+    units, values, effect = dict(model.units), model.parameters, traits(part.term)
+    if not effect.needs and any(name.startswith(KNOWN) for name in part.term.coordinates):
         if not part.affine:
             return "the other simulator's force: add to it what this text computes"
         return f"the other simulator's {', '.join(part.affine)}: put right there what was found"
-    effect = traits(part.term)
     if effect.late:
         exact = "" if effect.shift else ", to first order"
         time = float(values[part.affine[0]])

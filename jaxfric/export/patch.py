@@ -135,7 +135,8 @@ def _forces(
         model = _beside(told)
         able, others = ([], []) if model is None else callback.told(model)
         left += [
-            f"joint {joint}: {p.name}: it is no function of position and speed" for p in others
+            f"joint {joint}: {p.name}: it is no function of the joint's own position and speed"
+            for p in others
         ]
         good = _confirmed(source, text, joint, told, recordings[joint], model, able)
         left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]

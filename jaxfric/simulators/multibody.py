@@ -15,9 +15,10 @@ from ..data.recording import Recording
 from ..models import Model
 from ..terms import KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import Sum
+from ..terms.effects.cross_axis import neighbour_channel
 from . import actuation, columns, inverse
 from .known import AbstractSimulator, Attribute, along
-from .loading import joints_of, library, read
+from .loading import is_hinge, joints_of, library, read
 from .touching import alone, at_limit, touching
 
 # Of a limit that is reached, what rounding and the solver leave.
@@ -130,6 +131,7 @@ class Mujoco(AbstractSimulator):
         time = np.asarray(recording.time, float)
         for number, parts in enumerate(self.columns.along(seen, time)):
             found |= dict(zip(channels_of(number), parts, strict=True))
+        found |= self._neighbours(seen.motion.velocity)
         gone = self._sticks(seen) | self.limited(recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
@@ -141,6 +143,16 @@ class Mujoco(AbstractSimulator):
             )
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
         return np.where(gone, np.nan, seen.force[:, own]), sound
+
+    def _neighbours(self, velocity: Float[np.ndarray, "N dof"]) -> dict[str, np.ndarray]:
+        """The velocities of the other joints that move, m/s or rad/s, by channel."""
+        moving = np.flatnonzero(np.ptp(velocity, axis=0) > 0)
+        units = {
+            i: "rad" if is_hinge(self.mujoco, self.model, i) else "m"
+            for i in moving.tolist()
+            if i != self.number
+        }
+        return {neighbour_channel(self.joints[i], u): velocity[:, i] for i, u in units.items()}
 
     def limited(self, recording: Recording) -> Bool[np.ndarray, " N"]:
         """Where the joint is at a limit of the model, `(N,)`."""

@@ -150,6 +150,10 @@ def _no_waves(term: AbstractTerm) -> None:
     return None
 
 
+def _none_recorded(recording: Recording) -> tuple[AbstractTerm, ...]:
+    return ()
+
+
 def _no_variant(values: Mapping[str, float], extent: Extent) -> None:
     return None
 
@@ -173,7 +177,8 @@ class Effect:
     Where it shows:
 
     - `coordinates`: those of `jaxfric.explain.locate`, the most telling first.
-    - `needs`: signals beside time, velocity and force that a recording must have.
+    - `needs`: signals beside time, velocity and force that a recording must have for `laws`.
+    - `recorded`: terms for signals that only this recording has, one for each neighbour, say.
     - `confusable_with`: effects that leave nearly the same trace on an unlucky recording.
     - `separate_by`: the experiment that tells it from these.
 
@@ -223,6 +228,7 @@ class Effect:
     suited: Callable[[Any, AbstractTerm, float | None], tuple[AbstractTerm, ...]] = _as_it_is
     coordinates: tuple[str, ...] = ()
     needs: frozenset[str] = frozenset()
+    recorded: Callable[[Recording], tuple[AbstractTerm, ...]] = _none_recorded
     confusable_with: tuple[str, ...] = ()
     separate_by: str = ""
     positive: bool = False

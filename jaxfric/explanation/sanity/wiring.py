@@ -7,6 +7,7 @@ import numpy as np
 
 from ...simulators import Mujoco
 from ...simulators.loading import is_hinge
+from ...terms import KNOWN_FORCE
 from .faults import MOMENTS
 from .rows import Part, Rows, nodes
 
@@ -80,19 +81,32 @@ def _swapped(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
     sure = all(table[i, best[i]] < RIGHT and table[i, i] > WRONG for i in off)
     if not off or not sure or len(set(best)) < len(best):
         return {}
+    named = ",".join(f"{names[i]}_force=NAME" for i in off)
     return {
         names[i]: f"The force of joint {names[i]} is that of joint {names[best[i]]} in the "
         f"simulator (its own leaves {np.sqrt(table[i, i]):.0%}, that one "
         f"{np.sqrt(table[i, best[i]]):.0%}): the columns are permuted. Name them: --columns "
-        f"{names[best[i]]}_force=NAME."
+        f"{named}."
         for i in off
     }
 
 
 def _other(own: Rows, other: Rows) -> np.ndarray:
-    """The simulator's force of another joint at the rows of this one."""
-    values = np.asarray(other.evidence.motion.channels["known_force"], float)
-    return own.evidence.project(np.interp(nodes(own), nodes(other), values))
+    """The simulator's force of another joint at the rows of this one.
+
+    By the number of the sample, which increases where a clock does not. Nodes without samples say
+    nothing: their time and their force are zero.
+    """
+    said = other.evidence.elapsed > 0
+    values = np.asarray(other.evidence.motion.channels[KNOWN_FORCE], float)
+    at = np.interp(_samples(own), _samples(other)[said], values[said])
+    return own.evidence.project(at)
+
+
+def _samples(rows: Rows) -> np.ndarray:
+    """The samples in the middle of the nodes, `(M,)`."""
+    step = rows.evidence.width // rows.evidence.half
+    return step * np.arange(len(rows.evidence.elapsed))
 
 
 class Change(NamedTuple):

@@ -1,36 +1,85 @@
 """Another axis that pulls along."""
 
-from typing import ClassVar
+from collections.abc import Mapping
 
+import equinox as eqx
 import jax.numpy as jnp
 
-from ...units import DAMPING, Dimension
+from ...data.recording import Recording
+from ...units import DAMPING, INERTIA
 from ..base import AbstractLaw
-from ..effect import Effect
+from ..effect import Effect, Extent
+from ..known import KNOWN
 from ..sample import Parameter, Sample
 from ..table import reading
+
+# The channel of a recording's only neighbour; what those of several begin with.
+NEIGHBOUR, NEIGHBOURS = "neighbour_velocity", f"{KNOWN}velocity "
+DRAG, MASS = "coupling_viscous", "coupling_inertia"
+
+
+def neighbour_channel(name: str, unit: str) -> str:
+    """The channel of the velocity of a neighbour, whose position is in a unit, m or rad."""
+    return f"{NEIGHBOURS}{unit} {name}"
 
 
 class CrossAxis(AbstractLaw):
     """Coupling from another axis: u = d(C v₂)/dt + h v₂.
 
-    Needs that axis' velocity as the channel `neighbour_velocity`; its acceleration is never
-    formed, the weak form differentiates the kernel instead.
+    Needs that axis' velocity as a channel; its acceleration is never formed, the weak form
+    differentiates the kernel instead.
+
+    **Arguments:** `neighbour`, the name of that axis and the unit of its position, m or rad, where
+    there are several; `spelled`, the units of C and h where that axis turns and this one does not,
+    or the other way round.
     """
 
-    affine: ClassVar = (
-        Parameter("coupling_inertia", Dimension(force=1, position=-1, time=2)),
-        Parameter("coupling_viscous", DAMPING),
-    )
-    coordinates: ClassVar = frozenset({"neighbour_velocity"})
+    neighbour: tuple[str, ...] = eqx.field(static=True, default=(), converter=tuple)
+    spelled: tuple[str, ...] = eqx.field(static=True, default=(), converter=tuple)
+
+    @property
+    def channel(self) -> str:
+        """The channel of that axis' velocity."""
+        return neighbour_channel(*self.neighbour) if self.neighbour else NEIGHBOUR
+
+    @property
+    def affine(self):
+        units = self.spelled or (INERTIA, DAMPING)
+        end = f"_{self.neighbour[0]}" if self.neighbour else ""
+        return (Parameter(MASS + end, units[0]), Parameter(DRAG + end, units[1]))
+
+    @property
+    def coordinates(self):
+        return frozenset({self.channel})
 
     def law(self, sample: Sample):
-        other = reading(sample, "neighbour_velocity")
+        other = reading(sample, self.channel)
         return (jnp.zeros_like(other), other)
 
     def impulse(self, sample: Sample):
-        other = reading(sample, "neighbour_velocity")
+        other = reading(sample, self.channel)
         return (other, jnp.zeros_like(other))
+
+
+def _neighbours(recording: Recording) -> tuple[CrossAxis, ...]:
+    """One law for each of several neighbours that a recording has the velocities of."""
+    force, own = (recording.unit_names[name] for name in ("force", "position"))
+    found = []
+    for channel in recording.channels:
+        if channel.startswith(NEIGHBOURS):
+            unit, _, name = channel.removeprefix(NEIGHBOURS).partition(" ")
+            spelled = () if unit == own else (f"{force}·s²/{unit}", f"{force}·s/{unit}")
+            found.append(CrossAxis((name, unit), spelled))
+    return tuple(found)
+
+
+def _by_name(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence with the name of the neighbour, where it has one."""
+    name = next(name.removeprefix(DRAG) for name in values if name.startswith(DRAG))
+    return name and (
+        f"Joint {name[1:]} pulls along: {{{MASS}{name}}} times its acceleration and "
+        f"{{{DRAG}{name}}} times its velocity"
+    )
 
 
 CROSS_AXIS = Effect(
@@ -40,8 +89,10 @@ CROSS_AXIS = Effect(
     "The other axis pulls along: {coupling_inertia} times its acceleration and {coupling_viscous} "
     "times its velocity",
     laws=(CrossAxis,),
+    recorded=_neighbours,
     coordinates=("neighbour",),
-    needs=frozenset({"neighbour_velocity"}),
+    needs=frozenset({NEIGHBOUR}),
+    variant=_by_name,
     confusable_with=("load_drift", "periodic_disturbance"),
     separate_by="Hold the other axis still.",
 )
