@@ -8,6 +8,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import cli
+from jaxfric.explanation import fewest_numbers
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
 from jaxfric.explanation.joint_rows import JointRows
@@ -100,6 +101,22 @@ def test_a_load_is_one_body_of_one_mass_and_centre():
     assert {name.split("/")[1] for name in found.values} == {"fore"}
     assert abs(found.values[FORE + "mass_alone"] - 1.7) < 0.02
     assert abs(found.values[FORE + "centre_x"] - 0.24 / 1.7) < 0.002
+
+
+def test_one_body_is_tried_where_the_search_over_all_goes_astray(monkeypatch):
+    """It keeps a few sets of each size: a load may become two bodies that are not enough."""
+    robot = rows(arm(), arm(load=LOAD))
+    search = fewest_numbers._fewest
+
+    def astray(robot, bodies, apart, most=100):
+        if len(bodies) < 2:
+            return search(robot, bodies, apart, most)
+        return {FORE + "centre_x": 0.16, "body/upper/mass_alone": 2.1}
+
+    monkeypatch.setattr(fewest_numbers, "_fewest", astray)
+    found = fewest_numbers.fewest(robot, {"upper", "fore"})
+    assert {name.split("/")[1] for name in found} == {"fore"}
+    assert abs(found[FORE + "mass_alone"] - 1.7) < 0.02
 
 
 def test_what_one_joint_cannot_tell_apart_is_said():

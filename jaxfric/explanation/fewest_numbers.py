@@ -45,18 +45,28 @@ def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
 def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
     """The fewest numbers that leave no joint more than all linear parameters do; of fewer bodies,
     where one number more does for each body fewer: one part of a machine is wrong sooner than two.
+
+    The search over all bodies keeps a few sets of each size, and the right one may not be among
+    them. So where several bodies are not enough, any one body may be the answer, named or not.
     """
     found = _fewest(robot, frozenset(robot.weights), apart)
-    if np.any(robot.energies(found) - robot.least > robot.enough):
-        return found
     bodies = sorted({robot.owner[n][0] for n in found if n in robot.owner})
+    single = bodies if sufficient(robot, found) else sorted(robot.weights)
+    alike = robot.energies(found) + robot.enough
     for count in range(1, len(bodies)):
-        for some in itertools.combinations(bodies, count):
-            most = len(found) + len(bodies) - count
-            fewer = _fewest(robot, frozenset(some), apart, most)
-            if np.all(robot.energies(fewer) <= robot.energies(found) + robot.enough):
-                return fewer
+        most = len(found) + len(bodies) - count
+        sets = itertools.combinations(bodies if count > 1 else single, count)
+        tried = [_fewest(robot, frozenset(some), apart, most) for some in sets]
+        if fewer := [state for state in tried if np.all(robot.energies(state) <= alike)]:
+            return min(fewer, key=lambda state: (len(state), _changed(robot, state, apart)))
     return found
+
+
+def sufficient(robot: Bodies, state: State) -> bool:
+    """Whether a state leaves no joint more than all linear parameters do, but for what no sensor of
+    force resolves.
+    """
+    return bool(np.all(robot.energies(state) - robot.least <= robot.enough))
 
 
 def _fewest(
@@ -67,7 +77,7 @@ def _fewest(
     Each of them beyond its noise; among sets that do as well, the one that changes least.
     """
     found, beam = State(), [State()]
-    while len(found) < most and np.any(robot.energies(found) - robot.least > robot.enough):
+    while len(found) < most and not sufficient(robot, found):
         tried: dict[frozenset[str], tuple[float, State]] = {}
         for state in beam:
             for name in _promising(robot, state, bodies):
