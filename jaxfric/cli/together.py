@@ -57,11 +57,10 @@ def _clearly_more(new: Joint, own: Joint) -> bool:
 
 
 def _of_bodies(joint: Joint) -> list[str]:
-    """The values of bodies that a joint by itself finds wrong."""
+    """The values of bodies that a joint by itself finds wrong, those that it cannot tell too."""
     findings = joint.told.findings if joint.told else []
-    return [
-        key for f in findings if f.effect == MISMATCH for key in f.parameters if key[:5] == "body/"
-    ]
+    values = [key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)]
+    return [key for key in values if key.startswith("body/")]
 
 
 def _moves(joint: Joint, agreement: Agreement) -> bool:

@@ -69,7 +69,12 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
                 _, there = more.fitted(found.values, found.values)
                 known = joined(known, more.estimates(there))
     moved = {name: Moved(rows.before[name], known[name]) for name in values}
-    return Agreement(moved, _text(moved, found.instead, rows, told), found.instead)
+    text = _text(moved, found.instead, rows, told)
+    if found.short:
+        text += (
+            f"; that is not all: of joint {listed_and(found.short)} other bodies would leave less"
+        )
+    return Agreement(moved, text, found.instead)
 
 
 def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bodies | None:

@@ -24,12 +24,14 @@ UNSEEN = 1e-12
 
 class Answer(NamedTuple):
     """What all joints say together: the values that differ by name, with `estimates`, and what else
-    would do as well in place of each, `instead`.
+    would do as well in place of each, `instead`; `short`: joints of whose force they leave more
+    than others would, beyond noise.
     """
 
     values: State
     estimates: dict[str, Estimate]
     instead: dict[str, tuple[str, ...]]
+    short: tuple[str, ...] = ()
 
 
 def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
@@ -39,7 +41,17 @@ def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
     file.
     """
     state = fewest(robot, apart)
-    return Answer(state, robot.estimates(state) if state else {}, _instead(robot, state))
+    known = robot.estimates(state) if state else {}
+    return Answer(state, known, _instead(robot, state), _short(robot, state))
+
+
+def _short(robot: Bodies, state: State) -> tuple[str, ...]:
+    """Joints of which a state leaves more than all linear parameters do, by more than as many
+    parameters take of noise.
+    """
+    most = np.maximum(robot.enough, len(robot.pull))
+    more = robot.energies(state) - robot.least > most
+    return tuple(joint.name for joint, each in zip(robot.joints, more, strict=True) if each)
 
 
 def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
