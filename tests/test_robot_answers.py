@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxfric.cli import robot, robot_text
-from jaxfric.explanation import attributes
+from jaxfric.explanation import Explanation, attributes, contradictions
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import percent
 from jaxfric.export import errors
@@ -45,6 +45,15 @@ def test_a_value_that_may_be_as_it_was_is_not_told_as_wrong():
 def test_a_value_of_which_nothing_is_known_is_not_told_as_wrong():
     found = reworded(damping=(1582.0, np.inf))
     assert not found.parameters and found.untold == ("joint/elbow/damping",)
+
+
+def test_a_gain_that_may_be_none_is_not_told():
+    own = OWN | {"gain": Attribute("actuator m", "gear", 1.0, "1")}
+    for error, told in {2500.0: (), 25.0: ("actuator/m/gear",)}.items():
+        parameters = {"gain": Moved(0.0, Estimate(np.float64(2499.0), error, "1", 20.0))}
+        finding = Finding("parameter_mismatch", "", "", (), "", parameters, 0.9, None, 0.002)
+        found = attributes._reworded(finding, own)
+        assert tuple(found.parameters) == told and (found.attribute is None) != bool(told)
 
 
 def test_a_value_that_nothing_can_have_is_not_told_as_the_right_one():
@@ -120,3 +129,31 @@ def test_which_number_would_be_below_zero_is_said():
         weight.with_values({"centre_x": 169.8, "inertia_y": -17.3})
     with pytest.raises(ValueError, match="mass would be below zero"):
         weight.with_values({"mass": -0.1})
+
+
+def told_by(mass, error, verdict="explained", at=12.0):
+    """An explanation by which the mass of a body changes from 1.5 kg at a moment."""
+    own = Moved(1.5, Estimate(np.float64(mass), np.float64(error), "kg", 20.0))
+    moment = Estimate(np.float64(at), np.float64(0.1), "s", 20.0)
+    parameters = {"body/fore/mass": own, "step_time": moment}
+    finding = Finding("payload_change", "", "", (), "", parameters, 0.9, None, 0.002)
+    empty = dict.fromkeys(("where", "not_visible"), [])
+    rest = dict.fromkeys(("fit", "baseline_parameters", "recording"), {})
+    return Explanation(verdict, findings=[finding], model=None, baseline=None, baseline_name="",
+                       **empty, **rest)  # fmt: skip
+
+
+def test_joints_that_contradict_each_other_on_a_body_explain_nothing():
+    told = {"waist": told_by(2.655, 0.025), "elbow": told_by(2.947, 0.014)}
+    found = contradictions.with_contradictions(told)
+    assert {each.verdict for each in found.values()} == {"partly_explained"}
+    (warning,) = found["waist"].warnings
+    assert warning == found["elbow"].warnings[0] and not warning["severe"]
+    assert "mass of body fore: 2.65" in warning["text"] and "by waist and 2.94" in warning["text"]
+
+
+def test_joints_that_agree_on_a_body_or_tell_of_two_moments_do_not_contradict():
+    alike = {"waist": told_by(2.655, 0.025), "elbow": told_by(2.63, 0.02)}
+    assert contradictions.with_contradictions(alike) == alike
+    apart = {"waist": told_by(2.655, 0.025), "elbow": told_by(1.6, 0.014, at=5.0)}
+    assert contradictions.with_contradictions(apart) == apart

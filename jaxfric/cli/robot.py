@@ -9,6 +9,7 @@ from typing import Any
 from ..data.provenance import sha256
 from ..data.targets import standard
 from ..explanation import Explanation
+from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -69,6 +70,8 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
             found.append(explained(there[name], checked, arguments.mujoco, shared, arguments))
         doing("the bodies, by all joints")
         found = together(there, found, checked, shared, arguments)
+        told = with_contradictions({j.name: j.told for j in found if j.told is not None})
+        found = [joint._replace(told=told.get(joint.name)) for joint in found]
     without = [Joint(name, None, why, [], None, []) for name, why in logged.without.items()]
     return [*found, *without]
 
@@ -120,6 +123,7 @@ def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
         "still": list(joint.still),
+        "contradicted": [w["text"] for w in joint.told.warnings if w["name"] == CONTRADICTION],
         **written,
     }
 

@@ -34,14 +34,13 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):
             lines += ["", *wrapped(f"{row['joint']}: {each}")]
-    for each in dict.fromkeys(note for row in rows for note in row.get("still", ())):
-        lines += ["", *wrapped(each)]
-    said = " After: of the file as it was written." * any("file" in row for row in rows)
+    for name in ("contradicted", "still"):
+        for each in dict.fromkeys(text for row in rows for text in row.get(name, ())):
+            lines += ["", *wrapped(each)]
+    note = "Force errors through the kernel by which effects are looked for."
+    note += " After: of the file as it was written." * any("file" in row for row in rows)
     note += " Callback: with it beside the file." * (len(after) > 1)
-    lines += [
-        "",
-        *wrapped(f"Force errors through the kernel by which effects are looked for.{said}"),
-    ]
+    lines += ["", *wrapped(note)]
     return "\n".join(lines)
 
 

@@ -54,7 +54,7 @@ def _absolute(estimate: Estimate, attribute: Attribute) -> Estimate:
 
 def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
     every = _attributes(finding.parameters, own)
-    moved = {n: m for n, m in every.items() if not (m.may_be_none or impossible(n, m))}
+    moved = {n: m for n, m in every.items() if not (_unsure(n, m, own) or impossible(n, m))}
     texts = [_text(n, m, own) + _doubt(n, finding.instead, own) for n, m in moved.items()]
     rivals = tuple(r for r in finding.confusable_with if not _same(r, moved))
     texts += _untold({n: m for n, m in every.items() if n not in moved}, own)
@@ -70,6 +70,12 @@ def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
     )
 
 
+def _unsure(name: str, m: Moved, own: Mapping[str, Attribute]) -> bool:
+    """Whether a value may be what it was; of a gain also whether it may be none."""
+    low, high = map(float, m.interval())
+    return m.may_be_none or (name == _gear(own) and not (low > 0 or high < 0))
+
+
 def impossible(name: str, m: Moved) -> bool:
     """Whether a value is below zero, and nothing can be: a mass, or a damping."""
     return name.split("/")[-1].partition("_")[0] in POSITIVE and m.value < 0
@@ -82,9 +88,9 @@ def _untold(others: Mapping[str, Moved], own: Mapping[str, Attribute]) -> list[s
     texts = [
         f"{_text(name, m, own)}, which cannot be below zero: something else is wrong"
         for name, m in others.items()
-        if not m.may_be_none
+        if not _unsure(name, m, own)
     ]
-    unsure = [_name(name, own) for name, m in others.items() if m.may_be_none]
+    unsure = [_name(name, own) for name, m in others.items() if _unsure(name, m, own)]
     if unsure:
         said = listed(unsure, f"{len(unsure) - MOST} others")
         texts.append(f"perhaps {said}, by an amount that this recording cannot tell")
