@@ -15,7 +15,7 @@ from jaxfric.explanation.joint_rows import JointRows
 from jaxfric.export.patch import patch
 from jaxfric.simulators import inverse
 from jaxfric.simulators.patching import patched
-from jaxfric.simulators.weights import linear, possible, weights
+from jaxfric.simulators.weights import by_gravity, linear, possible, weights
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -66,7 +66,8 @@ def rows(nominal, plant, noise=0.005, seed=0):
     forces = inverse.forces(mujoco, true, along) - inverse.forces(mujoco, model, along)
     draw, found = np.random.default_rng(seed), []
     for joint, name in enumerate(("shoulder", "elbow")):
-        parts = linear(mujoco, model, joint, seen)
+        pulls = by_gravity(mujoco, model, joint, seen)
+        parts = [(rest, 0 * rest) for rest in pulls] + linear(mujoco, model, joint, seen)
         columns = np.array([rest + np.gradient(moving, time) for rest, moving in parts]).T
         own = np.array([along.velocity[:, joint], along.acceleration[:, joint]]).T
         inner = slice(2, -2)  # the ends have one-sided differences
@@ -75,7 +76,7 @@ def rows(nominal, plant, noise=0.005, seed=0):
         whole = np.concatenate([own, columns], axis=1)[inner] / noise
         block = np.arange(len(time) - 4) * 24 // (len(time) - 4)
         found.append(JointRows(name, names, whole, target[inner] / noise, block, 1.0))
-    return Bodies(found, weights(mujoco, model))
+    return Bodies(found, weights(mujoco, model), model.opt.gravity)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +125,7 @@ def test_what_one_joint_cannot_tell_apart_is_said():
     these two, so that either of two numbers may be another.
     """
     robot = rows(arm(), arm(load=LOAD))
-    alone = Bodies([robot.joints[1]], robot.weights)
+    alone = Bodies([robot.joints[1]], robot.weights, np.array([0.0, 0.0, -9.81]))
     found = answer(alone, {"upper", "fore"})
     assert len(found.values) == 2
     others = {name for each in found.instead.values() for name in each}
@@ -133,6 +134,41 @@ def test_what_one_joint_cannot_tell_apart_is_said():
 
 def test_nothing_is_found_where_nothing_differs():
     assert answer(rows(arm(), arm()), ()).values == {}
+
+
+def pulled(gravity):
+    """The arm where gravity is another one than in the file."""
+    return arm().replace("<option ", f'<option gravity="{gravity}" ')
+
+
+def test_a_base_that_is_tilted_is_no_fault_of_the_bodies():
+    tilt = np.radians(3.0)
+    robot = rows(arm(), pulled(f"{9.81 * np.sin(tilt)} 0 {-9.81 * np.cos(tilt)}"))
+    found = answer(robot, {"upper", "fore"})
+    assert list(found.values) == ["option/gravity/x"]
+    known = found.estimates["option/gravity/x"]
+    assert abs(known.value - 9.81 * np.sin(tilt)) < 3 * known.standard_error < 0.05
+    assert known.unit == "m/s²"
+    # Its size stays.
+    assert robot.gravity(found.values) == pytest.approx(-9.81 * np.cos(tilt), abs=1e-3)
+
+
+def test_a_gravity_of_another_size_is_one_number():
+    found = answer(rows(pulled("0 0 -9"), arm()), {"upper", "fore"})
+    assert list(found.values) == ["option/gravity/z"]
+    assert found.values["option/gravity/z"] == pytest.approx(-9.81, abs=0.01)
+
+
+@pytest.mark.parametrize("text", [arm(), pulled("0 1 -9")])
+def test_gravity_is_written_into_the_file_s_option(text):
+    done = patched(mujoco, text, {"option/gravity/x": 0.5, "option/gravity/z": -9.8})
+    assert not done.left and len(done.written) == 2
+    model, before = (mujoco.MjModel.from_xml_string(each) for each in (done.text, text))
+    assert model.opt.gravity == pytest.approx([0.5, before.opt.gravity[1], -9.8])
+    assert model.opt.timestep == before.opt.timestep
+    bare = "\n".join(line for line in text.splitlines() if "<option" not in line)
+    done = patched(mujoco, bare, {"option/gravity/x": 0.5})
+    assert mujoco.MjModel.from_xml_string(done.text).opt.gravity == pytest.approx([0.5, 0, -9.81])
 
 
 def test_an_inertia_is_one_that_a_body_can_have():
@@ -192,6 +228,25 @@ def test_a_load_is_written_once_and_the_file_keeps_its_word(tmp_path, capsys):
     for errors in document["patch"]["errors"].values():
         assert errors["holdout_force_error"]["file"] < 0.02 < errors["force_error"]["before"]
     assert document["patch"]["misses"] == [] and document["patch"]["left"] == []
+
+
+@pytest.mark.slow
+def test_gravity_is_told_by_all_joints_and_written_once(tmp_path, capsys):
+    (tmp_path / "arm.xml").write_text(pulled("0 0 -9"))
+    logs = [str(tmp_path / f"log{seed}.csv") for seed in (1, 2)]
+    for seed, path in enumerate(logs):
+        log(path, arm(), seed)
+    command = ["explain", logs[0], "--holdout", logs[1], "--mujoco", str(tmp_path / "arm.xml")]
+    new, out = str(tmp_path / "new.xml"), str(tmp_path / "out.json")
+    assert cli.main([*command, "--save", new, "--json", out]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert said.count("shoulder and elbow together: gravity along z -9 → -9.8") == 1
+    assert "body" not in said
+    assert mujoco.MjModel.from_xml_path(new).opt.gravity[2] == pytest.approx(-9.81, rel=0.01)
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert [row["verdict"] for row in document["joints"]] == ["explained"] * 2
+    for errors in document["patch"]["errors"].values():
+        assert errors["holdout_force_error"]["file"] < 0.02 < errors["force_error"]["before"]
 
 
 @pytest.mark.slow

@@ -1,13 +1,15 @@
-"""A robot's bodies by all of its joints: one value of each, and the joints again with it."""
+"""A robot's bodies, and gravity, by all of its joints: one value of each, and the joints again."""
 
 from argparse import Namespace
 from collections.abc import Mapping, Sequence
 
 from ..explanation.acceptance import LINEARITY
 from ..explanation.agreement import Agreement, Told, agreed, with_bodies
+from ..explanation.attributes import CONSTANT
 from ..explanation.sanity import CheckedSimulator
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched, with_inertial
+from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .robot_joints import Joint, explained
 
@@ -16,15 +18,16 @@ def together(
     opened: Mapping[str, Joint], found: Sequence[Joint],
     checked: Mapping[str, CheckedSimulator], shared, arguments: Namespace,
 ) -> list[Joint]:  # fmt: skip
-    """The joints with one answer for the bodies that they move.
+    """The joints with one answer for the bodies that they move, and for gravity.
 
-    Where a joint by itself finds values of bodies wrong, all joints are asked for the fewest such
-    values that explain them all; with these the joints are explained again, each by what is its
-    own. Where the file does not take the values, or a joint is left with clearly more than by its
-    own answer, the joints' own answers stand: what they contradict each other in is not written.
+    Where a joint by itself finds what a weight can do, all joints are asked for the fewest values
+    of bodies and of gravity that explain them all; with these the joints are explained again, each
+    by what is its own. Where the file does not take the values, or a joint is left with clearly
+    more than by its own answer, the joints' own answers stand: what they contradict each other in
+    is not written.
     """
     able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
-    if not any(_of_bodies(joint) for joint in able):
+    if not any(_of_bodies(joint) or _as_a_weight(joint) for joint in able):
         return list(found)
     mujoco = library()
     told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
@@ -57,22 +60,38 @@ def _clearly_more(new: Joint, own: Joint) -> bool:
 
 
 def _of_bodies(joint: Joint) -> list[str]:
-    """The values of bodies that a joint by itself finds wrong, those that it cannot tell too."""
+    """The values of bodies that a joint by itself finds wrong."""
+    return [key for key in _wrong(joint) if key.startswith("body/")]
+
+
+def _wrong(joint: Joint) -> list[str]:
+    """The values that a joint by itself finds wrong, those that it cannot tell too."""
     findings = joint.told.findings if joint.told else []
-    values = [key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)]
-    return [key for key in values if key.startswith("body/")]
+    return [key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)]
+
+
+def _as_a_weight(joint: Joint) -> bool:
+    """Whether a joint by itself finds what gravity of another direction does to it: a constant
+    force, a spring, a force that follows the position.
+    """
+    findings = joint.told.findings if joint.told else []
+    names = {key.split("/")[-1] for key in _wrong(joint)}
+    places = {EFFECTS[f.effect].family for f in findings if f.effect in EFFECTS}
+    return bool(names & {CONSTANT, "stiffness", "springref"}) or "position" in places
 
 
 def _moves(joint: Joint, agreement: Agreement) -> bool:
-    """Whether a joint moves one of the bodies whose values are wrong."""
-    bodies = {key.split("/")[1] for key in agreement.parameters}
-    return joint.simulator is not None and bool(bodies & joint.simulator.bodies())
+    """Whether a joint feels one of the values that are wrong."""
+    if joint.simulator is None:
+        return False
+    return agreement.everywhere or bool(agreement.bodies & joint.simulator.bodies())
 
 
 def _joined(first: Joint, new: Joint, agreement: Agreement, names: Sequence[str]) -> Joint:
     """A joint explained again, with what all say of its bodies before it."""
     if new.told is None or first.told is None:
         return first
-    if not _moves(first, agreement):
+    unmoved = first.told.verdict == new.told.verdict == "consistent"
+    if unmoved or not _moves(first, agreement):
         return new
     return new._replace(told=with_bodies(new.told, first.told, agreement, names))

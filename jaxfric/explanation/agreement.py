@@ -1,16 +1,20 @@
-"""What all joints of a robot say of its bodies together, beside what each says by itself."""
+"""What all joints of a robot say of its bodies and of gravity together, beside what each says by
+itself.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import jax
+import numpy as np
 
 from ..data.printable import listed_and
 from ..data.recording import Recording
+from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..simulators import Attribute, Mujoco
 from ..simulators.columns import GAIN
-from ..simulators.weights import MASS, attribute, weights
+from ..simulators.weights import GRAVITY, MASS, attribute, weights
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled
@@ -24,6 +28,11 @@ from .joint_rows import joint_rows
 from .quantities import quantity
 from .sanity.preceding import p_value, with_preceding
 
+# The numbers of a part that is bolted to a body.
+MASS_AND_CENTRE = 4
+# A base is set up to a tenth of a degree.
+STRAIGHT = 0.1
+
 
 class Told(NamedTuple):
     """One joint: its simulator as given, its recordings (the one explained, and the held-out one if
@@ -36,8 +45,8 @@ class Told(NamedTuple):
 
 
 class Agreement(NamedTuple):
-    """The values of bodies that all joints together say are wrong: `parameters` by name, `text` in
-    words, `instead` what else would do as well in place of each.
+    """The values of bodies and of gravity that all joints together say are wrong: `parameters` by
+    name, `text` in words, `instead` what else would do as well in place of each.
     """
 
     parameters: dict[str, Moved]
@@ -47,6 +56,16 @@ class Agreement(NamedTuple):
     def values(self) -> dict[str, float]:
         """The values by name."""
         return {name: float(moved.value) for name, moved in self.parameters.items()}
+
+    @property
+    def bodies(self) -> set[str]:
+        """The bodies whose values are wrong."""
+        return {name.split("/")[1] for name in self.parameters if name not in GRAVITY}
+
+    @property
+    def everywhere(self) -> bool:
+        """Whether gravity is among them, which every joint feels."""
+        return any(name in GRAVITY for name in self.parameters)
 
 
 def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
@@ -61,7 +80,7 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     with jax.enable_x64(True):
         rows = _rows(told, bodies)
         found = answer(rows, apart)
-        values = {n: v for n, v in found.values.items() if n in rows.owner}
+        values = {n: v for n, v in found.values.items() if n in rows.owner or n in GRAVITY}
         known = {name: found.estimates[name] for name in values}
         for more, joined in ((_rows(told, bodies, wide=2), spelled.with_smoothing),
                              (_rows(told, bodies, held=True), spelled.with_elsewhere)):  # fmt: skip
@@ -69,12 +88,23 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
                 _, there = more.fitted(found.values, found.values)
                 known = joined(known, more.estimates(there))
     moved = {name: Moved(rows.before[name], known[name]) for name in values}
+    if rows.turned(values):
+        moved[rows.down] = _down(rows, values, known)
     text = _text(moved, found.instead, rows, told)
     if found.short:
         text += (
             f"; that is not all: of joint {listed_and(found.short)} other bodies would leave less"
         )
     return Agreement(moved, text, found.instead)
+
+
+def _down(rows: Bodies, values: State, known: Mapping[str, Estimate]) -> Moved:
+    """Gravity's largest component, which follows from the others."""
+    value, others = rows.gravity(values), [name for name in values if name in GRAVITY]
+    spread = sum(values[n] * float(known[n].standard_error) for n in others) / value
+    freedom = min(known[n].degrees_of_freedom for n in others)
+    error = np.float64(abs(spread))
+    return Moved(rows.before[rows.down], Estimate(np.float64(value), error, "m/s²", freedom))
 
 
 def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bodies | None:
@@ -92,7 +122,7 @@ def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bo
             if not held and wide == 1:
                 raise
             return None
-    return Bodies(found, bodies)
+    return Bodies(found, bodies, told[0].simulator.model.opt.gravity)
 
 
 def with_bodies(
@@ -143,18 +173,47 @@ def _text(
     own = {each.simulator.joint: each.simulator.attributes() for each in told}
     texts = []
     for name, m in moved.items():
-        body, what = rows.owner[name]
-        value = attribute(rows.weights[body], body, what)
-        text = f"{value.owner}: {value.what} {m.before:.4g} → {quantity(m.estimate, smaller=False)}"
+        said = quantity(m.estimate, smaller=False)
+        text = f"{_value(name, rows)} {m.before:.4g} → {said}"
         if others := instead.get(name):
-            said = dict.fromkeys(_said(other, rows, own) for other in others)
-            text += f" (or {listed(list(said), 'others')}: these motions cannot tell them apart)"
+            alike = dict.fromkeys(_said(other, rows, own) for other in others)
+            text += f" (or {listed(list(alike), 'others')}: these motions cannot tell them apart)"
         texts.append(text)
-    return "; ".join([*texts, *_raised(moved, rows)])
+    return "; ".join(
+        [*texts, *_turned(moved, rows), *_raised(moved, rows), *_geometry(moved, rows)]
+    )
+
+
+def _value(name: str, rows: Bodies) -> str:
+    """A value of a body or of gravity in words."""
+    if name in GRAVITY:
+        return f"gravity along {name[-1]}"
+    body, what = rows.owner[name]
+    value = attribute(rows.weights[body], body, what)
+    return f"{value.owner}: {value.what}"
+
+
+def _turned(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
+    """By how much gravity has another direction than in the file, as of a base that is askew."""
+    if not any(name in moved for name in GRAVITY):
+        return []
+    before = np.array([rows.before[name] for name in GRAVITY])
+    after = np.array([moved[n].value if n in moved else rows.before[n] for n in GRAVITY], float)
+    sizes = np.linalg.norm(before), np.linalg.norm(after)
+    if not all(sizes):
+        return []
+    angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(before, after)), before @ after))
+    text = f"gravity is {sizes[1]:.4g} m/s²"
+    if angle < STRAIGHT:
+        return [f"{text} and of the same direction"]
+    how = "is tilted" if angle < 45 else "is mounted another way"
+    return [f"{text} and {angle:.3g}° from the file's direction: the base {how}"]
 
 
 def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -> str:
     """A number that would do as well, in words."""
+    if name in GRAVITY:
+        return _value(name, rows)
     if name in rows.owner:
         body, what = rows.owner[name]
         return str(attribute(rows.weights[body], body, what))
@@ -168,12 +227,25 @@ def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -
     )
 
 
+def _geometry(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
+    """A doubt where more numbers of several bodies differ than a part that is added explains: the
+    mass and the centre of one body are four.
+    """
+    bodies = dict.fromkeys(rows.owner[name][0] for name in moved if name in rows.owner)
+    if len(bodies) < 2 or len(moved) <= MASS_AND_CENTRE:
+        return []
+    return [
+        f"that is {len(moved)} numbers of {len(bodies)} bodies: look first at the file's geometry "
+        "(lengths of links, axes, couplings of joints), which is not among what is asked"
+    ]
+
+
 def _raised(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
     """The inertias that go along because no body could be without."""
     texts = []
     for body, weight in rows.weights.items():
         own: State = {rows.owner[n][1]: float(m.value) for n, m in moved.items()
-                      if rows.owner[n][0] == body}  # fmt: skip
+                      if n in rows.owner and rows.owner[n][0] == body}  # fmt: skip
         new = weight.with_values(own)
         times = new.mass / weight.mass if MASS in own else 1.0
         for letter, i, before in zip("xyz", new.inertia, weight.inertia, strict=True):

@@ -149,7 +149,7 @@ def _gear(own: Mapping[str, Attribute]) -> str:
 # Without a command in the log, what else a constant force may be.
 MAY_BE = (
     "the actuator's bias, which a log of its command would show, the zero of the force's sensor, "
-    "or a weight that the model lacks"
+    "or a weight or a tilt that the model lacks"
 )
 # A filter that the model's actuator lacks, in MuJoCo's own words.
 FILTER = "filterexact"

@@ -1,19 +1,22 @@
-"""What the bodies of a robot weigh, by all joints that move them together.
+"""What the bodies of a robot weigh, and which way gravity pulls, by all joints together.
 
 A joint's force is linear in ten parameters of each body (mass, first moment, inertia about its
 frame), and these are what a file's numbers make of them: m c and I + m (c² 1 − c cᵀ) are no linear
 functions of mass and centre. So the fewest of the file's numbers that leave no joint more than all
 the linear parameters do are looked for by Gauss-Newton's steps, each set by itself, with one value
-of each number for all joints.
+of each number for all joints. Gravity, the same for all, counts as three more numbers: a base that
+stands askew is no fault of a body. It pulls on bodies as they are in the file, to first order, and
+keeps its size where only its direction is a number.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from jaxtyping import Float
 
 from ..identification.uncertainty import Estimate
 from ..simulators.rigid import PARAMETERS
-from ..simulators.weights import Weight, attribute
+from ..simulators.weights import GRAVITY, Weight, attribute
 from .intervals import spread
 from .joint_rows import JointRows
 from .regression import Fit
@@ -32,18 +35,23 @@ class Bodies:
         self,
         joints: Sequence[JointRows],
         weights: Mapping[str, Weight],
+        gravity: Float[np.ndarray, "3"],
     ):
         self.joints, self.weights = joints, weights
         own = [f"{joint.name}:{name}" for joint in joints for name in joint.own]
-        self.place = {name: i for i, name in enumerate(own)}
+        self.place = {name: i for i, name in enumerate([*own, *GRAVITY])}
+        self.shared = len(own)
         self.before = dict.fromkeys(own, 0.0)
+        self.before |= {n: float(g) for n, g in zip(GRAVITY, gravity, strict=True)}
+        self.down = GRAVITY[int(np.argmax(np.abs(gravity)))]
         self.owner: dict[str, tuple[str, str]] = {}
         for body, weight in weights.items():
             for what, value in weight.values().items():
                 self.owner[f"body/{body}/{what}"] = body, what
                 self.before[f"body/{body}/{what}"] = value
-        self.starts = {body: len(own) + PARAMETERS * i for i, body in enumerate(weights)}
-        count = len(own) + PARAMETERS * len(weights)
+        bodies = len(self.place)
+        self.starts = {body: bodies + PARAMETERS * i for i, body in enumerate(weights)}
+        count = bodies + PARAMETERS * len(weights)
         self.grams = np.zeros((len(joints), count, count))
         self.pulls, self.pull = np.zeros((len(joints), count)), np.zeros(count)
         self.powers = np.array([joint.target @ joint.target for joint in joints])
@@ -62,7 +70,7 @@ class Bodies:
         """Where the columns of a joint stand among those of all."""
         first = sum(len(joint.own) for joint in self.joints[:number])
         own = list(range(first, first + len(self.joints[number].own)))
-        return own + list(range(len(self.place), len(self.pull)))
+        return own + list(range(self.shared, len(self.pull)))
 
     def _energies(self, shift: np.ndarray) -> np.ndarray:
         """The energy that a shift of all linear parameters leaves of each joint, in its noise's."""
@@ -81,12 +89,31 @@ class Bodies:
         """
         found = np.zeros(len(self.pull))
         for name in state.keys() & self.place.keys():
-            found[self.place[name]] = state[name]
+            found[self.place[name]] = state[name] - self.before[name]
+        if self.turned(state):
+            found[self.place[self.down]] = self.gravity(state) - self.before[self.down]
         for body in {self.owner[n][0] for n in state if n in self.owner}:
             start = self.starts[body]
             new = self.weight(body, state, any_).parameters()
             found[start : start + PARAMETERS] = new - self.weights[body].parameters()
         return found
+
+    def turned(self, state: State) -> bool:
+        """Whether only the direction of gravity is a number, not its largest component."""
+        return self.down not in state and not state.keys().isdisjoint(GRAVITY)
+
+    def gravity(self, state: State) -> float:
+        """The largest component of gravity, m/s², with which its size is that of the file."""
+        largest, squares = self.before[self.down], sum(self.before[n] ** 2 for n in GRAVITY)
+        others = sum(state.get(n, self.before[n]) ** 2 for n in GRAVITY if n != self.down)
+        return float(np.copysign(np.sqrt(max(squares - others, 0.0)), largest))
+
+    def unchanged(self, name: str, state: State) -> float:
+        """What a number of a state would be without it: the file's, gravity's largest component
+        such that its size is the file's.
+        """
+        rest = {n: value for n, value in state.items() if n != name}
+        return self.gravity(rest) if name == self.down else self.before[name]
 
     def weight(self, body: str, state: State, any_: bool = False) -> Weight:
         """What a body weighs in a state."""
@@ -96,13 +123,17 @@ class Bodies:
 
     def value(self, name: str, state: State) -> float:
         """A number in a state that may not hold it, as it goes along with the others."""
+        if name == self.down and self.turned(state):
+            return self.gravity(state)
         if name in state or name in self.place:
-            return state.get(name, 0.0)
+            return state.get(name, self.before[name])
         body, what = self.owner[name]
         return self.weight(body, state).values()[what]
 
     def size(self, name: str) -> float:
         """The size of a number, that of zero too."""
+        if name in GRAVITY:
+            return float(np.linalg.norm([self.before[each] for each in GRAVITY])) or 1.0
         if name in self.place:
             return 1.0
         body, what = self.owner[name]
@@ -114,7 +145,7 @@ class Bodies:
         """Derivatives of the linear parameters by the numbers of those names, `(count, names)`."""
         found = []
         for name in names:
-            if name in self.place:
+            if name in self.place and name not in GRAVITY:
                 found.append(np.eye(1, len(self.pull), self.place[name])[0])
                 continue
             value, sides = self.value(name, state), []
@@ -206,6 +237,8 @@ class Bodies:
         }
 
     def _unit(self, name: str) -> str:
+        if name in GRAVITY:
+            return "m/s²"
         if name in self.place:
             return ""
         body, what = self.owner[name]

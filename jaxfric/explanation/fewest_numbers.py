@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..identification.uncertainty import Estimate
-from ..simulators.weights import MASS, MASS_ALONE
+from ..simulators.weights import GRAVITY, MASS, MASS_ALONE
 from .bodies import Bodies, State
 from .least_squares import orthonormal
 from .mismatch import SURE
@@ -132,21 +132,22 @@ def _others(robot: Bodies, state: State) -> list[str]:
 
 
 def _sure(robot: Bodies, state: State) -> bool:
-    """Whether each number of a state differs from the simulator's beyond noise."""
+    """Whether each number of a state differs beyond noise from what it would be without it."""
     return all(
-        abs(float(e.value) - robot.before[name]) > SURE * float(e.standard_error)
+        abs(float(e.value) - robot.unchanged(name, state)) > SURE * float(e.standard_error)
         for name, e in robot.estimates(state).items()
     )
 
 
 def _changed(robot: Bodies, state: State, apart: Collection[str]) -> float:
     """By how much a state's numbers differ from the simulator's, a part of each, summed; where a
-    mass takes more than one number of the file, that counts as another one.
+    mass takes more than one number of the file, that counts as another one. What a joint's own
+    number or a body's does as well is not gravity.
     """
     found = 0.0
     for name, value in state.items():
         if name in robot.place:
-            found += 1.0
+            found += 2.0 if name in GRAVITY else 1.0
             continue
         body, what = robot.owner[name]
         before, size = robot.before[name], abs(value - robot.before[name])

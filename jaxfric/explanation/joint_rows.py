@@ -9,7 +9,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from ..simulators import Mujoco
-from ..simulators.weights import linear
+from ..simulators.weights import by_gravity, linear
 from ..terms import KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import summands
 from ..terms.effects import traits
@@ -27,9 +27,9 @@ class JointRows(NamedTuple):
     """One joint's rows, divided by its noise, without the span of the physics that was found in it.
 
     - `name` of the joint; `own`: names of its own values, p of them, in the simulator's words.
-    - `columns` `(J, p + 10 B)`: the force by a unit of its own values, and of the ten parameters
-      that the force of each of the model's B bodies is linear in; `target` `(J,)`: what the
-      simulator, as given, leaves; `block` of each row, `(J,)`.
+    - `columns` `(J, p + 3 + 10 B)`: the force by a unit of its own values, of gravity along each
+      axis, and of the ten parameters that the force of each of the model's B bodies is linear in;
+      `target` `(J,)`: what the simulator, as given, leaves; `block` of each row, `(J,)`.
     - `enough`: the energy below which no sensor of force tells anything, in units of the noise's.
     """
 
@@ -51,7 +51,8 @@ def joint_rows(
     `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width.
     """
     seen = simulator.along(log)
-    parts = linear(simulator.mujoco, simulator.model, simulator.number, seen)
+    of = simulator.mujoco, simulator.model, simulator.number, seen
+    parts = [(rest, np.zeros_like(rest)) for rest in by_gravity(*of)] + linear(*of)
     names = [name for name in simulator.attributes() if not name.startswith("body/")]
     first = len(simulator.attributes())
     beside = simulator.beside(log)
@@ -63,13 +64,13 @@ def joint_rows(
     if wide > 1:
         evidence = gather(motion, wide * evidence.width, delay, half=wide * NODES)
     every = KnownColumns(tuple(simulator.attributes()), ("1",) * first)
-    ten = KnownColumns(tuple(f"{i}" for i in range(len(parts))), ("1",) * len(parts), first)
+    shared = KnownColumns(tuple(f"{i}" for i in range(len(parts))), ("1",) * len(parts), first)
     known = evidence.columns(every, np.zeros((1, 0)))[0]
     own = [known[:, [i]] for i, name in enumerate(every.names) if name in names]
     constant = [t for t in summands(simulator.baseline(log.units).term) if isinstance(t, Offset)]
     own += [evidence.columns(t, np.zeros((1, 0)))[0] for t in constant]
     names += [p.name for t in constant for p in t.affine]
-    columns = np.concatenate([*own, evidence.columns(ten, np.zeros((1, 0)))[0]], axis=1)
+    columns = np.concatenate([*own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
     basis = _physics(found, evidence)
     columns = columns - basis @ (basis.T @ columns)
     target = evidence.target - basis @ (basis.T @ evidence.target)

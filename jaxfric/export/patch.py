@@ -171,6 +171,10 @@ def _confirmed(
     return kept(able, error)
 
 
+# Kinds of values that every joint feels.
+SHARED = ("body/", "option/")
+
+
 def _without_harm(source, done: Patched, values, found, recordings):
     """The file without values that make a joint worse than it was, first those of bodies, then the
     joint's own; the forces beside it by joint, and why others are not written; and the force
@@ -181,7 +185,7 @@ def _without_harm(source, done: Patched, values, found, recordings):
     for own in (False, True):
         joints = [joint for joint, each in errors.items() if worse(each)]
         mine = {key for joint in joints for key in _moved(found[joint])}
-        harm = [k for k in done.written if (k in mine if own else k.startswith("body/"))]
+        harm = [k for k in done.written if (k in mine if own else k.startswith(SHARED))]
         if not joints or not harm:
             continue
         said = [f"joint {joint} would be worse: {from_to(errors[joint])}" for joint in joints]

@@ -89,4 +89,5 @@ def _scales(state: State) -> Scales:
     slowest = state.nodes[0]
     fastest = jnp.where(jnp.isfinite(least), jnp.maximum(least, 4 * slowest), state.nodes[-1])
     zero = jnp.zeros_like(slowest)
-    return Scales(slowest, fastest, *[zero] * 4, jnp.ones_like(slowest), state.interval, zero)
+    one, interval = jnp.ones_like(slowest), state.interval
+    return Scales(slowest, fastest, zero, zero, zero, zero, one, interval, peak=zero)

@@ -82,7 +82,7 @@ def _groups(values: Mapping[str, float]) -> list[dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     for key, value in values.items():
         kind, owner, what = key.split("/")
-        whole = kind == "body" or what in ("stiffness", "springref", "ref")
+        whole = kind in ("body", "option") or what in ("stiffness", "springref", "ref")
         # An actuator's law is written whole; its gear and its delay are attributes beside it.
         whole |= kind == "actuator" and what not in ("gear", "delay")
         found.setdefault(f"{kind}/{owner}" if whole else key, {})[key] = value
@@ -101,7 +101,9 @@ def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> 
     new: dict[int, str] = {}
     kind, owner, _ = next(iter(group)).split("/")
     own = {key.split("/")[2]: value for key, value in group.items()}
-    if kind == "joint":
+    if kind == "option":
+        _of_gravity(model, own, found, changes, new)
+    elif kind == "joint":
         joint = names.index(owner)
         changes[tree.joints[joint]] = _of_joint(mujoco, model, joint, own, found)
     elif kind == "actuator":
@@ -140,6 +142,17 @@ def _in_degrees(found: list[Tag]) -> bool:
         t.attributes["angle"] for t in found if t.name == "compiler" and "angle" in t.attributes
     ]
     return not angles or angles[-1] != "radian"
+
+
+def _of_gravity(model: Any, own: Mapping[str, float], found: list[Tag], changes, new) -> None:
+    """Gravity in the file's `option`, there already or added."""
+    values = [own.get(k, float(g)) for k, g in zip("xyz", model.opt.gravity, strict=True)]
+    gravity = " ".join(map(_number, values))
+    options = [i for i, tag in enumerate(found) if tag.name == "option"]
+    if options:
+        changes[options[-1]] = {"gravity": gravity}
+    else:
+        new[0] = f'<option gravity="{gravity}"/>'
 
 
 def _of_body(mujoco, model, body, own, found: list[Tag], tree: Bodies, changes, new) -> None:
@@ -192,6 +205,8 @@ def _check(mujoco: Any, new: Any, old: Any, group: Mapping[str, float]) -> None:
                 "armature": new.dof_armature, "ref": new.qpos0, LIMIT: new.jnt_actfrcrange[:, 1],
             }  # fmt: skip
             read_back = float(place[what][joint])
+        elif kind == "option":
+            read_back = float(new.opt.gravity["xyz".index(what)])
         elif kind == "actuator":
             read_back = actuators.value(mujoco, new, owner, what)
         else:

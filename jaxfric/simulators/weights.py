@@ -119,6 +119,24 @@ def linear(mujoco: Any, model: Any, joint: int, seen: Along) -> list[tuple[np.nd
     return found
 
 
+# Gravity along the axes of the world, as a file's values.
+GRAVITY = tuple(f"option/gravity/{letter}" for letter in "xyz")
+
+
+def by_gravity(mujoco: Any, model: Any, joint: int, seen: Along) -> list[np.ndarray]:
+    """A joint's force, `(N,)`, by 1 m/s² of gravity along each axis of the world."""
+    none, *units = np.concatenate([np.zeros((1, 3)), np.eye(3)])
+    found = [np.zeros(len(seen.rest))] * 3
+    for b in range(1, model.nbody):
+        theta, frame = weight_of(mujoco, model, b).parameters(), seen.frames[b - 1]
+        still = rigid.regressor(frame, theta, none)[0][:, joint]
+        found = [
+            whole + rigid.regressor(frame, theta, unit)[0][:, joint] - still
+            for whole, unit in zip(found, units, strict=True)
+        ]
+    return found
+
+
 def attribute(weight: Weight, body: str, what: str) -> Attribute:
     """A value of a body in words."""
     words = {MASS: "mass with its inertia in proportion", MASS_ALONE: "mass"}

@@ -15,8 +15,8 @@ from ..text import literal
 
 
 def _knee_bounds(scales):
-    """From half the root-mean-square force, below which most samples lie beyond the knee and the law
-    is a gain plus a dead-band, to the peak: of short moves between long dwells that is many times it.
+    """From half the root-mean-square force, below which most samples lie beyond the knee and the
+    law is a gain plus a dead-band, to the peak: many times that of short moves between long dwells.
     """
     return 0.5 * scales.force, scales.peak
 
