@@ -11,8 +11,10 @@ from jaxfric import cli
 from jaxfric.explanation import agreement, fewest_numbers
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
+from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.joint_rows import JointRows
 from jaxfric.export.patch import patch
+from jaxfric.identification.uncertainty import Estimate
 from jaxfric.simulators import Mujoco, inverse
 from jaxfric.simulators.patching import patched
 from jaxfric.simulators.weights import by_gravity, linear, possible, weights
@@ -287,3 +289,15 @@ def test_a_value_that_makes_a_joint_worse_is_not_written(tmp_path):
     assert "not all of its answer is in the file" in done.misses[0]
     error = done.errors["elbow"]["force_error"]
     assert error["file"] == pytest.approx(error["before"])
+
+
+def test_values_of_several_bodies_raise_a_doubt_about_the_geometry():
+    robot = rows(arm(), arm())
+    estimate = Estimate(np.float64(2.5), np.float64(0.01), "kg")
+
+    def said(*names):
+        return agreement._geometry({name: Moved(2.0, estimate) for name in names}, robot)
+
+    assert said(FORE + "mass", FORE + "centre_x", "option/gravity/x") == []
+    (doubt,) = said(FORE + "mass", "body/upper/mass")
+    assert "2 bodies" in doubt and "geometry" in doubt

@@ -28,8 +28,6 @@ from .joint_rows import joint_rows
 from .quantities import quantity
 from .sanity.preceding import p_value, with_preceding
 
-# The numbers of a part that is bolted to a body.
-MASS_AND_CENTRE = 4
 # A base is set up to a tenth of a degree.
 STRAIGHT = 0.1
 
@@ -242,14 +240,12 @@ def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -
 
 
 def _geometry(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
-    """A doubt where more numbers of several bodies differ than a part that is added explains: the
-    mass and the centre of one body are four.
-    """
+    """A doubt where values of several bodies differ: a part that is bolted on changes one."""
     bodies = dict.fromkeys(rows.owner[name][0] for name in moved if name in rows.owner)
-    if len(bodies) < 2 or len(moved) <= MASS_AND_CENTRE:
+    if len(bodies) < 2:
         return []
     return [
-        f"that is {len(moved)} numbers of {len(bodies)} bodies: look first at the file's geometry "
+        f"these are values of {len(bodies)} bodies at once: look first at the file's geometry "
         "(lengths of links, axes, couplings of joints), which is not among what is asked"
     ]
 
