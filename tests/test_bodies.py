@@ -8,14 +8,14 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import cli
-from jaxfric.explanation import agreement
+from jaxfric.explanation import agreement, fewest_numbers
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
 from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.joint_rows import JointRows
 from jaxfric.export.patch import patch
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.simulators import inverse
+from jaxfric.simulators import Mujoco, inverse
 from jaxfric.simulators.patching import patched
 from jaxfric.simulators.weights import by_gravity, linear, possible, weights
 
@@ -104,6 +104,36 @@ def test_a_load_is_one_body_of_one_mass_and_centre():
     assert {name.split("/")[1] for name in found.values} == {"fore"}
     assert abs(found.values[FORE + "mass_alone"] - 1.7) < 0.02
     assert abs(found.values[FORE + "centre_x"] - 0.24 / 1.7) < 0.002
+
+
+def test_one_body_is_tried_where_the_search_over_all_goes_astray(monkeypatch):
+    """It keeps a few sets of each size: a load may become two bodies that are not enough."""
+    robot = rows(arm(), arm(load=LOAD))
+    search = fewest_numbers._fewest
+
+    def astray(robot, bodies, apart, most=100):
+        if len(bodies) < 2:
+            return search(robot, bodies, apart, most)
+        return {FORE + "centre_x": 0.16, "body/upper/mass_alone": 2.1}
+
+    monkeypatch.setattr(fewest_numbers, "_fewest", astray)
+    found = fewest_numbers.fewest(robot, {"upper", "fore"})
+    assert {name.split("/")[1] for name in found} == {"fore"}
+    assert abs(found[FORE + "mass_alone"] - 1.7) < 0.02
+
+
+def test_a_value_of_a_body_that_may_be_as_it_was_is_not_told(monkeypatch):
+    """The held-out recording has its centre as much nearer as this one has it further out."""
+    centres = "0.12 0 0", "0.08 0 0"
+    own, held = (rows(arm(), arm(centre=each, mass="1.7")) for each in centres)
+
+    def given(told, bodies, wide=1, **of):
+        return None if wide > 1 else held if of else own
+
+    monkeypatch.setattr(agreement, "_rows", given)
+    told = [agreement.Told(Mujoco(arm(), name), [], None) for name in ("shoulder", "elbow")]
+    found = agreement.agreed(told, {"upper", "fore"})
+    assert set(found.parameters) == {FORE + "mass_alone"} and "centre" not in found.text
 
 
 def test_what_one_joint_cannot_tell_apart_is_said():

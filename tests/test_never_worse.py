@@ -22,6 +22,7 @@ from jaxfric.explanation import (
     regression,
 )
 from jaxfric.explanation.improvement import Errors
+from jaxfric.explanation.parameters import may_be_none
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
 from jaxfric.identification.uncertainty import Estimate
@@ -544,6 +545,13 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
 
     monkeypatch.setattr(improvement, "estimated", estimated)
     assert improvement.without_unsure(Dated("abc", "")).names == "ac"
+
+
+def test_the_change_of_a_simulators_value_is_tested_by_the_interval_that_is_told():
+    """Of one that acts in few blocks that is wider: 1.00 ± 1.05 with three degrees of freedom."""
+    few = {"viscous": Estimate(np.float64(1.0), np.float64(0.33), "", 3.0)}
+    assert not may_be_none(terms.Viscous(), few)
+    assert may_be_none(terms.Viscous(), few, as_told=True)
 
 
 @pytest.mark.parametrize(("wrong", "left"), [("c", "ab"), ("b", "ac"), ("bc", "b"), ("", "abc")])

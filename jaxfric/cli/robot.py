@@ -9,6 +9,7 @@ from typing import Any
 from ..data.provenance import sha256
 from ..data.targets import standard
 from ..explanation import Explanation
+from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -69,6 +70,8 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
             found.append(explained(there[name], checked, arguments.mujoco, shared, arguments))
         doing("the bodies, by all joints")
         found = together(there, found, checked, shared, arguments)
+        told = with_contradictions({j.name: j.told for j in found if j.told is not None})
+        found = [joint._replace(told=told.get(joint.name)) for joint in found]
     without = [Joint(name, None, why, [], None, []) for name, why in logged.without.items()]
     return [*found, *without]
 
@@ -100,20 +103,28 @@ def _document(arguments: Namespace, joint: Joint) -> dict[str, Any]:
 
 
 def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
-    """One joint of the summary; `file`: what the written file leaves of its force."""
+    """One joint of the summary; `file`: what the written file leaves of its force, and `callback`
+    what it does with the callback too. Where that is no less than before nothing is `explained`.
+    """
     if joint.told is None:
         return {"joint": joint.name, "verdict": "refused", "error": joint.error}
-    errors = joint.told.fit
+    errors, verdict = joint.told.fit, joint.told.verdict
+    if verdict == "explained" and done is not None and not done.falls(joint.name):
+        verdict = "partly_explained"
+    written = {} if done is None else {"file": done.after(joint.name)}
+    if done is not None and (callback := done.with_forces(joint.name)):
+        written["callback"] = callback
     return {
         "joint": joint.name,
-        "verdict": joint.told.verdict,
+        "verdict": verdict,
         "findings": [*_severe(joint.told), *map(_said, joint.told.findings)],
         "filtered_force_error": errors["filtered_force_error"],
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
         "still": list(joint.still),
-        **({} if done is None else {"file": done.after(joint.name)}),
+        "contradicted": [w["text"] for w in joint.told.warnings if w["name"] == CONTRADICTION],
+        **written,
     }
 
 

@@ -4,21 +4,23 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..data.printable import printable
+from ..explanation.quantities import percent
 from ..looks.text import aligned, wrapped
 
 
 def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """What a simulator's joints and a log differ in, a row each."""
-    table = [["joint", "verdict", "error", "after", "held out", "after", "what"]]
+    after = ["after", *["callback"] * any("callback" in row for row in rows)]
+    table = [["joint", "verdict", "error", *after, "held out", *after, "what"]]
     for row in rows:
-        if "error" in row:
-            table.append([row["joint"], row["verdict"], *[""] * 4, "see below"])
-            continue
-        errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
-        cells = [f"{e[w]:.2%}" if e else "" for e in errors for w in ("before", "after")]
-        table.append([row["joint"], row["verdict"], *cells, "see below" * bool(row["findings"])])
+        cells = [""] * 2 * (1 + len(after))
+        if "error" not in row:
+            errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
+            cells = [percent(e[w]) if w in e else "" for e in errors for w in ("before", *after)]
+        below = "see below" * bool("error" in row or row["findings"])
+        table.append([row["joint"], row["verdict"], *cells, below])
     lines = [f"{printable(simulator)} against {printable(log)}", ""]
-    lines += aligned(table, (2, 3, 4, 5))
+    lines += aligned(table, range(2, 4 + 2 * len(after)))
     every = [each for row in rows for each in row.get("findings", ())]
     shared = {each for each in every if every.count(each) > 1}  # said of several joints together
     lines += [
@@ -32,18 +34,25 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):
             lines += ["", *wrapped(f"{row['joint']}: {each}")]
-    for each in dict.fromkeys(note for row in rows for note in row.get("still", ())):
-        lines += ["", *wrapped(each)]
-    after = " After: of the file as it was written." * any("file" in row for row in rows)
-    lines += ["", f"Force errors through the kernel by which effects are looked for.{after}"]
+    for name in ("contradicted", "still"):
+        for each in dict.fromkeys(text for row in rows for text in row.get(name, ())):
+            lines += ["", *wrapped(each)]
+    note = "Force errors through the kernel by which effects are looked for."
+    note += " After: of the file as it was written." * any("file" in row for row in rows)
+    note += " Callback: with it beside the file." * (len(after) > 1)
+    lines += ["", *wrapped(note)]
     return "\n".join(lines)
 
 
-def _with_file(row: Mapping[str, Any], name: str) -> Mapping[str, float] | None:
-    """A joint's errors before and after; after by the written file, where there is one."""
+def _with_file(row: Mapping[str, Any], name: str) -> Mapping[str, float]:
+    """A joint's errors before and after; after by the written file, where there is one, and with
+    the callback beside it, where one is.
+    """
     error = row[f"filtered_{name}"]
-    written = row.get("file", {}).get(name)
-    return error if written is None or error is None else {**error, "after": written}
+    if error is None:
+        return {}
+    written = {"after": row.get("file", {}), "callback": row.get("callback", {})}
+    return {**error, **{key: each[name] for key, each in written.items() if name in each}}
 
 
 def patch(path: str, document: Mapping[str, Any]) -> str:
@@ -56,7 +65,7 @@ def patch(path: str, document: Mapping[str, Any]) -> str:
     for joint, errors in document["errors"].items():
         for name, error in errors.items():
             held = "held out" if name.startswith("holdout") else "recording"
-            cells = [f"{error[w]:.2%}" if w in error else "" for w in ("before", "file", "forces")]
+            cells = [percent(error[w]) if w in error else "" for w in ("before", "file", "forces")]
             table.append([f"{joint}, {held}", *cells])
     lines += ["", *aligned(table, (1, 2, 3))]
     for line in document["misses"]:

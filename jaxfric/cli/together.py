@@ -61,10 +61,13 @@ def _clearly_more(new: Joint, own: Joint) -> bool:
 
 def _of_bodies(joint: Joint) -> list[str]:
     """The values of bodies that a joint by itself finds wrong."""
+    return [key for key in _wrong(joint) if key.startswith("body/")]
+
+
+def _wrong(joint: Joint) -> list[str]:
+    """The values that a joint by itself finds wrong, those that it cannot tell too."""
     findings = joint.told.findings if joint.told else []
-    return [
-        key for f in findings if f.effect == MISMATCH for key in f.parameters if key[:5] == "body/"
-    ]
+    return [key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)]
 
 
 def _as_a_weight(joint: Joint) -> bool:
@@ -72,7 +75,7 @@ def _as_a_weight(joint: Joint) -> bool:
     force, a spring, a force that follows the position.
     """
     findings = joint.told.findings if joint.told else []
-    names = {key.split("/")[-1] for f in findings if f.effect == MISMATCH for key in f.parameters}
+    names = {key.split("/")[-1] for key in _wrong(joint)}
     places = {EFFECTS[f.effect].family for f in findings if f.effect in EFFECTS}
     return bool(names & {CONSTANT, "stiffness", "springref"}) or "position" in places
 

@@ -77,18 +77,37 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     bodies = weights(simulator.mujoco, simulator.model)
     with jax.enable_x64(True):
         rows = _rows(told, bodies)
+        others = [(_rows(told, bodies, wide=2), spelled.with_smoothing),
+                  (_rows(told, bodies, held=True), spelled.with_elsewhere)]  # fmt: skip
         found = answer(rows, apart)
-        values = {n: v for n, v in found.values.items() if n in rows.owner or n in GRAVITY}
-        known = {name: found.estimates[name] for name in values}
-        for more, joined in ((_rows(told, bodies, wide=2), spelled.with_smoothing),
-                             (_rows(told, bodies, held=True), spelled.with_elsewhere)):  # fmt: skip
-            if values and more is not None:
-                _, there = more.fitted(found.values, found.values)
-                known = joined(known, more.estimates(there))
-    moved = {name: Moved(rows.before[name], known[name]) for name in values}
+        state, moved = found.values, _moved(rows, others, found.values)
+        while unsure := {name for name, m in moved.items() if m.may_be_none}:
+            rest = {name: value for name, value in state.items() if name not in unsure}
+            _, state = rows.fitted(rest, rest)
+            moved = _moved(rows, others, state)
+    values = {name: float(m.value) for name, m in moved.items()}
+    known = {name: m.estimate for name, m in moved.items()}
     if rows.turned(values):
         moved[rows.down] = _down(rows, values, known)
-    return Agreement(moved, _text(moved, found.instead, rows, told), found.instead)
+    text = _text(moved, found.instead, rows, told)
+    if moved and found.short:
+        text += (
+            f"; that is not all: of joint {listed_and(found.short)} other bodies would leave less"
+        )
+    return Agreement(moved, text, found.instead)
+
+
+def _moved(rows: Bodies, others, state: State) -> dict[str, Moved]:
+    """The values of bodies and of gravity in a state, with what `others` add to their errors: rows
+    through another kernel or of another recording, or `None`, and how they do.
+    """
+    own = {n for n in state if n in rows.owner or n in GRAVITY}
+    known = {n: e for n, e in rows.estimates(state).items() if n in own} if own else {}
+    for more, joined in others:
+        if own and more is not None:
+            _, there = more.fitted(state, state)
+            known = joined(known, more.estimates(there))
+    return {name: Moved(rows.before[name], estimate) for name, estimate in known.items()}
 
 
 def _down(rows: Bodies, values: State, known: Mapping[str, Estimate]) -> Moved:

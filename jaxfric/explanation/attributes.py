@@ -27,22 +27,25 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
 
     The model keeps the corrections, which are zero where the simulator is right.
     """
-    now = {
-        name: own[name].value + (float(value) if name != GAIN else 0.0)
-        for name, value in told.model.parameters.items()
-        if name in own
-    }
     rate = float(told.recording["sample_rate"])
     own = {key: a._replace(between=1 / rate) if a.unit == "s" else a for key, a in own.items()}
-    findings = [
-        _reworded(f, own) if f.effect == MISMATCH else _late(_stepped(f, own, now), own)
-        for f in told.findings
-    ]
+    findings = [_reworded(f, own) if f.effect == MISMATCH else f for f in told.findings]
+    wrong = {n for f in findings if f.effect == MISMATCH for n in f.parameters} - {GAIN}
+    corrected = told.model.parameters
+    now = {n: a.value + (float(corrected[n]) if n in wrong else 0.0) for n, a in own.items()}
+    findings = [f if f.effect == MISMATCH else _late(_stepped(f, own, now), own) for f in findings]
     values = {
         name: _absolute(estimate, own[name]) if name in own and name != GAIN else estimate
         for name, estimate in told.baseline_parameters.items()
     }
-    return dataclasses.replace(told, findings=findings, baseline_parameters=values)
+    verdict = claimed(told.verdict, findings)
+    return dataclasses.replace(told, findings=findings, baseline_parameters=values, verdict=verdict)
+
+
+def claimed(verdict: str, findings: Sequence[Finding]) -> str:
+    """The verdict in a simulator's words: it is `explained` only by values that can be told."""
+    doubtful = verdict == "explained" and any(finding.untold for finding in findings)
+    return "partly_explained" if doubtful else verdict
 
 
 def _absolute(estimate: Estimate, attribute: Attribute) -> Estimate:
@@ -50,22 +53,56 @@ def _absolute(estimate: Estimate, attribute: Attribute) -> Estimate:
 
 
 def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
-    moved = _attributes(finding.parameters, own)
-    texts = [_text(name, m, own) for name, m in moved.items()]
-    texts = [
-        text + _doubt(name, m, finding.instead, own)
-        for text, (name, m) in zip(texts, moved.items(), strict=True)
-    ]
+    every = _attributes(finding.parameters, own)
+    moved = {n: m for n, m in every.items() if not (_unsure(n, m, own) or impossible(n, m))}
+    texts = [_text(n, m, own) + _doubt(n, finding.instead, own) for n, m in moved.items()]
     rivals = tuple(r for r in finding.confusable_with if not _same(r, moved))
-    share = f"{finding.share:.0%} of the unexplained force{indistinct(rivals)}"
+    texts += _untold({n: m for n, m in every.items() if n not in moved}, own)
+    texts.append(f"{finding.share:.0%} of the unexplained force{indistinct(rivals)}.")
     geared = {_gear(own)} - {GAIN}
     names = [n for n in moved if n in own or n in geared or n.endswith(REFERENCE)]
     return finding._replace(
         parameters=moved,
         confusable_with=rivals,
-        sentence=f"Wrong in the simulator: {'; '.join(texts)}; {share}.",
+        sentence=f"Wrong in the simulator: {'; '.join(texts)}",
         attribute=", ".join(names) or None,
+        untold=tuple(n for n in every if n not in moved),
     )
+
+
+def _unsure(name: str, m: Moved, own: Mapping[str, Attribute]) -> bool:
+    """Whether a value may be what it was; of a gain also whether it may be none."""
+    low, high = map(float, m.interval())
+    return m.may_be_none or (name == _gear(own) and not (low > 0 or high < 0))
+
+
+def impossible(name: str, m: Moved) -> bool:
+    """Whether a value is below zero, and nothing can be: a mass, or a damping."""
+    return name.split("/")[-1].partition("_")[0] in POSITIVE and m.value < 0
+
+
+def _untold(others: Mapping[str, Moved], own: Mapping[str, Attribute]) -> list[str]:
+    """Values that are fitted with those that are wrong, in words: those that nothing can have, and
+    the names of those that may be as they were.
+    """
+    texts = [
+        f"{_text(name, m, own)}, which cannot be below zero: something else is wrong"
+        for name, m in others.items()
+        if not _unsure(name, m, own)
+    ]
+    unsure = [_name(name, own) for name, m in others.items() if _unsure(name, m, own)]
+    if unsure:
+        said = listed(unsure, f"{len(unsure) - MOST} others")
+        texts.append(f"perhaps {said}, by an amount that this recording cannot tell")
+    return texts
+
+
+def _name(name: str, own: Mapping[str, Attribute]) -> str:
+    """An attribute in words, without its value."""
+    if name == CONSTANT:
+        return "a constant force"
+    key = GAIN if name == _gear(own) else name
+    return str(own[key]) if key in own else " of ".join(reversed(name.split("/")[1:]))
 
 
 def _same(rival: str, moved: Mapping[str, Moved]) -> bool:
@@ -174,14 +211,15 @@ def _stepped(finding: Finding, own: Mapping[str, Attribute], now: Mapping[str, f
     instead = {key: tuple(keys.values())} if keys else {}
     value = quantity(after, smaller=False)
     reason = finding.sentence.partition(";")[0].partition(": ")[2]
-    text = (
-        f"At t = {quantity(moment_)} {attribute.owner}'s {attribute.what} changes from "
-        f"{before:.4g} to {value}{_doubt(key, moved, instead, own)}{reason and f': {reason}'}; "
-        f"{finding.share:.0%} of the unexplained force"
-    )
+    text = f"At t = {quantity(moment_)} {attribute.owner}'s {attribute.what} "
+    share = f"{finding.share:.0%} of the unexplained force{indistinct(finding.confusable_with)}."
+    if impossible(key, moved):
+        text += f"would have to change from {before:.4g} to {value}, which cannot be below zero: "
+        return finding._replace(sentence=f"{text}something else changes; {share}", untold=(key,))
+    text += f"changes from {before:.4g} to {value}{_doubt(key, instead, own)}"
     return finding._replace(
         parameters={**finding.parameters, key: moved}, attribute=key, instead=instead,
-        sentence=f"{text}{indistinct(finding.confusable_with)}.",
+        sentence=f"{text}{reason and f': {reason}'}; {share}",
     )  # fmt: skip
 
 
@@ -226,14 +264,10 @@ def _times(m: Moved) -> str:
     return f" (the recorded force, or the torque constant, is {times:.4g} times the simulator's)"
 
 
-def _doubt(
-    name: str, m: Moved, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]
-) -> str:
+def _doubt(name: str, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]) -> str:
     """What else it may be: what no motion tells from it, and what this one does not."""
     key = GAIN if name == _gear(own) else name
-    alike = own[key].alike if key in own else ()
-    impossible = key in own and own[key].what.split()[0] in POSITIVE and m.value < 0
-    texts = ["which cannot be below zero"] if impossible else []
+    texts, alike = [], own[key].alike if key in own else ()
     if alike:
         said = listed(alike, f"{len(alike) - MOST} others")
         texts.append(f"or {said}: no motion of this joint tells them apart")

@@ -240,4 +240,4 @@ def _improved(
         for problem in (findings.problem, findings.undelayed.problem):
             for candidates in problem.candidate_sets:
                 candidates.forget()
-    return improved(first, without_unsure(findings), inputs.figures)
+    return improved(first, without_unsure(findings, bool(inputs.attributes)), inputs.figures)

@@ -24,12 +24,14 @@ UNSEEN = 1e-12
 
 class Answer(NamedTuple):
     """What all joints say together: the values that differ by name, with `estimates`, and what else
-    would do as well in place of each, `instead`.
+    would do as well in place of each, `instead`; `short`: joints of whose force they leave more
+    than others would, beyond noise.
     """
 
     values: State
     estimates: dict[str, Estimate]
     instead: dict[str, tuple[str, ...]]
+    short: tuple[str, ...] = ()
 
 
 def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
@@ -39,24 +41,44 @@ def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
     file.
     """
     state = fewest(robot, apart)
-    return Answer(state, robot.estimates(state) if state else {}, _instead(robot, state))
+    known = robot.estimates(state) if state else {}
+    return Answer(state, known, _instead(robot, state), _short(robot, state))
+
+
+def _short(robot: Bodies, state: State) -> tuple[str, ...]:
+    """Joints of which a state leaves more than all linear parameters do, by more than as many
+    parameters take of noise.
+    """
+    most = np.maximum(robot.enough, len(robot.pull))
+    more = robot.energies(state) - robot.least > most
+    return tuple(joint.name for joint, each in zip(robot.joints, more, strict=True) if each)
 
 
 def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
     """The fewest numbers that leave no joint more than all linear parameters do; of fewer bodies,
     where one number more does for each body fewer: one part of a machine is wrong sooner than two.
+
+    The search over all bodies keeps a few sets of each size, and the right one may not be among
+    them. So where several bodies are not enough, any one body may be the answer, named or not.
     """
     found = _fewest(robot, frozenset(robot.weights), apart)
-    if np.any(robot.energies(found) - robot.least > robot.enough):
-        return found
     bodies = sorted({robot.owner[n][0] for n in found if n in robot.owner})
+    single = bodies if sufficient(robot, found) else sorted(robot.weights)
+    alike = robot.energies(found) + robot.enough
     for count in range(1, len(bodies)):
-        for some in itertools.combinations(bodies, count):
-            most = len(found) + len(bodies) - count
-            fewer = _fewest(robot, frozenset(some), apart, most)
-            if np.all(robot.energies(fewer) <= robot.energies(found) + robot.enough):
-                return fewer
+        most = len(found) + len(bodies) - count
+        sets = itertools.combinations(bodies if count > 1 else single, count)
+        tried = [_fewest(robot, frozenset(some), apart, most) for some in sets]
+        if fewer := [state for state in tried if np.all(robot.energies(state) <= alike)]:
+            return min(fewer, key=lambda state: (len(state), _changed(robot, state, apart)))
     return found
+
+
+def sufficient(robot: Bodies, state: State) -> bool:
+    """Whether a state leaves no joint more than all linear parameters do, but for what no sensor of
+    force resolves.
+    """
+    return bool(np.all(robot.energies(state) - robot.least <= robot.enough))
 
 
 def _fewest(
@@ -67,7 +89,7 @@ def _fewest(
     Each of them beyond its noise; among sets that do as well, the one that changes least.
     """
     found, beam = State(), [State()]
-    while len(found) < most and np.any(robot.energies(found) - robot.least > robot.enough):
+    while len(found) < most and not sufficient(robot, found):
         tried: dict[frozenset[str], tuple[float, State]] = {}
         for state in beam:
             for name in _promising(robot, state, bodies):

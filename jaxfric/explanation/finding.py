@@ -44,6 +44,12 @@ class Moved(NamedTuple):
         return self.estimate.interval(level)
 
     @property
+    def may_be_none(self) -> bool:
+        """Whether the interval of the change holds zero: the value may be what it was."""
+        low, high = map(float, self.change.interval())
+        return not (low > 0 or high < 0)
+
+    @property
     def change(self) -> Estimate:
         """What the value is more than before, with the error of both."""
         error = math.hypot(float(self.standard_error), self.before_error)
@@ -70,7 +76,8 @@ class Finding(NamedTuple):
     - `p_value`: paid for by the number of terms tried.
     - `attribute`: the simulator's own name for it, where there is one; `confirmed`: whether the
       held-out recording confirms it, `None` where it is not tested; `instead`: to each wrong value
-      by name, others that this motion cannot tell from it.
+      by name, others that this motion cannot tell from it; `untold`: a simulator's values that are
+      fitted with the others, but may be as they were, or are such as nothing can have.
     """
 
     effect: str
@@ -85,6 +92,7 @@ class Finding(NamedTuple):
     attribute: str | None = None
     confirmed: bool | None = None
     instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    untold: tuple[str, ...] = ()
 
 
 def findings_document(findings: Sequence[Finding]) -> list[dict[str, Any]]:
@@ -93,6 +101,7 @@ def findings_document(findings: Sequence[Finding]) -> list[dict[str, Any]]:
         {**finding._asdict(), "parameters": estimates_document(finding.parameters)}
         | {"confusable_with": list(finding.confusable_with)}
         | {"instead": {name: list(others) for name, others in finding.instead.items()}}
+        | {"untold": list(finding.untold)}
         for finding in findings
     ]
 

@@ -130,12 +130,13 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n for n in names if names.count(n) > others.count(n)))
 
 
-def without_unsure(findings: Findings) -> Findings:
+def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
     """Without changes at a moment whose size may as well be none once the moment is uncertain, and
     without pushes all of which may be none.
 
     What a change is told by is the value before and after: an interval that holds both says
-    nothing. Pushes are told by their sizes alone.
+    nothing. Pushes are told by their sizes alone. `as_told`: a change is tested by the interval
+    that is told, as of a simulator's value; that is wider where it acts in few blocks.
     """
     while True:
         selected = findings.selection.selected
@@ -144,7 +145,8 @@ def without_unsure(findings: Findings) -> Findings:
             return findings
         values = estimated(findings)[findings.selection.term_index(0) :]
         terms = findings.selection.last.terms[findings.selection.term_index(0) :]
-        unsure = [n for n in dated if spelled.may_be_none(terms[n], values[n])]
+        told = [as_told and bool(each.effect.moment) for each in selected]
+        unsure = [n for n in dated if spelled.may_be_none(terms[n], values[n], as_told=told[n])]
         if not unsure:
             return findings
         findings = findings.without(unsure[-1])

@@ -62,18 +62,19 @@ def tested(estimate: Estimate) -> Estimate:
 
 
 def may_be_none(
-    term: AbstractTerm, own: dict[str, Estimate], other: dict[str, Estimate] | None = None
-) -> bool:
+    term: AbstractTerm, own: dict[str, Estimate], other: dict[str, Estimate] | None = None,
+    as_told: bool = False,
+) -> bool:  # fmt: skip
     """Whether of all that its force is proportional to, of waves of the amplitudes too, there is no
     interval that leaves out zero.
 
     `other`: the same by other rows, of another recording or through a kernel of twice the width,
     which have to agree with it, as those that see little of it do, or to leave out zero on the same
-    side.
+    side. `as_told`: by the intervals that are told instead of those of [`tested`][].
     """
 
     def sure(name: str) -> bool:
-        low, high = tested(own[name]).interval()
+        low, high = (own[name] if as_told else tested(own[name])).interval()
         if low * high <= 0 or other is None:
             return bool(low * high > 0)
         least, most = tested(other[name]).interval()

@@ -93,3 +93,12 @@ def rise(before: float, after: float) -> str:
     apart = (d for d in (2, 3) if round(100 * before, d) != round(100 * after, d))
     digits = next(apart, 4)
     return f"{before:.{digits}%} to {after:.{digits}%}"
+
+
+# A larger error tells no more than that it is larger.
+MOST_PERCENT = 10.0
+
+
+def percent(error: float) -> str:
+    """A force error relative to the force: "12.30%", and "over 1000%" beyond that."""
+    return f"{error:.2%}" if error <= MOST_PERCENT else f"over {MOST_PERCENT:.0%}"

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from ..explanation import Explanation
 from ..explanation.acceptance import LINEARITY
+from ..explanation.quantities import percent
 
 
 def reached(error: Mapping[str, float]) -> float:
@@ -17,14 +18,22 @@ def _more(one: float, other: float) -> bool:
 
 
 def worse(errors: Mapping[str, Mapping[str, float]]) -> bool:
-    """Whether what was written leaves a joint more than the file as it was, on any recording."""
-    return any(_more(reached(each), each["before"]) for each in errors.values())
+    """Whether the file leaves a joint more than it did as it was, on any recording, by itself or
+    with the forces beside it.
+    """
+    return any(_more(max(each["file"], reached(each)), each["before"]) for each in errors.values())
+
+
+def falls(error: Mapping[str, float]) -> bool:
+    """Whether what was written leaves less of a recording's force than the file as it was."""
+    return _more(error["before"], reached(error))
 
 
 def from_to(errors: Mapping[str, Mapping[str, float]]) -> str:
-    """Errors before and after in words."""
+    """Errors before and after in words, of the file or with the forces, whichever is more."""
     return ", ".join(
-        f"{each['before']:.2%} → {reached(each):.2%}{' held out' * name.startswith('holdout')}"
+        f"{percent(each['before'])} → {percent(max(each['file'], reached(each)))}"
+        f"{' held out' * name.startswith('holdout')}"
         for name, each in errors.items()
     )
 
@@ -36,5 +45,7 @@ def miss(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]
         own = told.fit[f"filtered_{name}"]
         if own and _more(reached(each), own["after"]):
             held = "of the held-out recording " if name.startswith("holdout") else ""
-            texts.append(f"{held}{own['after']:.2%} by its answer, {reached(each):.2%} by the file")
+            by = "the file and the callback" if "forces" in each else "the file"
+            left = f"{percent(own['after'])} by its answer, {percent(reached(each))} by {by}"
+            texts.append(held + left)
     return f"joint {joint}: not all of its answer is in the file: {'; '.join(texts)}" * bool(texts)

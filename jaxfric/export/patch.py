@@ -22,7 +22,7 @@ from ..terms.base import AbstractTerm, Sum
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback, readback
-from .errors import from_to, miss, reached, worse
+from .errors import falls, from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
 from .rerun import Rerun, rerun
@@ -70,8 +70,17 @@ class Patch(NamedTuple):
         }  # fmt: skip
 
     def after(self, joint: str) -> dict[str, float]:
-        """What the file leaves of a joint's force, with the forces beside it, by recording."""
-        return {name: reached(each) for name, each in self.errors[joint].items()}
+        """What the file alone leaves of a joint's force, by recording."""
+        return {name: each["file"] for name, each in self.errors[joint].items()}
+
+    def with_forces(self, joint: str) -> dict[str, float]:
+        """What the file leaves with the forces beside it, by recording; empty without any."""
+        errors = self.errors[joint].items()
+        return {name: each["forces"] for name, each in errors if "forces" in each}
+
+    def falls(self, joint: str) -> bool:
+        """Whether what was written leaves less of the force of a joint's recording than before."""
+        return falls(next(iter(self.errors[joint].values())))
 
 
 def patch(
@@ -83,8 +92,8 @@ def patch(
 ) -> Patch:
     """The simulator's file with the findings of its joints.
 
-    The file is read again as it was written. Values of bodies with which a joint is worse than
-    before, on any recording, are not written.
+    The file is read again as it was written. Values with which a joint is worse than before, on any
+    recording, are not written: neither where the file by itself is, nor with the forces beside it.
 
     **Arguments:** `source`, the file; by joint the explanations, and the recordings (the first is
     the one explained, the second held out); `name` of the file to be, for the module beside it;
@@ -106,12 +115,11 @@ def patch(
     left += [f"{_label(key)}: {why}" for key, why in apart.items()]
     values = {key: pair for key, pair in values.items() if key not in apart}
     done = patched(library(), source, {key: to for key, (_, to) in values.items()})
-    models, unable = _forces(source, done.text, found, recordings)
+    done, models, unable, errors = _without_harm(source, done, values, found, recordings)
     left += unable
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
     forces = callback.callback(models, speeds, module) if models else None
-    done, errors = _without_harm(source, done, values, found, recordings, models)
     written = [
         f"{_label(key)}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written
     ]
@@ -168,12 +176,12 @@ def _confirmed(
 SHARED = ("body/", "option/")
 
 
-def _without_harm(
-    source, done: Patched, values, found, recordings, models
-) -> tuple[Patched, dict[str, dict[str, Any]]]:
+def _without_harm(source, done: Patched, values, found, recordings):
     """The file without values that make a joint worse than it was, first those of bodies, then the
-    joint's own; and the force errors of all joints by it.
+    joint's own; the forces beside it by joint, and why others are not written; and the force
+    errors of all joints by it.
     """
+    models, unable = _forces(source, done.text, found, recordings)
     errors = _read_again(source, done.text, found, recordings, models)
     for own in (False, True):
         joints = [joint for joint, each in errors.items() if worse(each)]
@@ -185,8 +193,9 @@ def _without_harm(
         kept = {key: values[key][1] for key in done.written if key not in harm}
         left = {**done.left, **dict.fromkeys(harm, "; ".join(said))}
         done = patched(library(), source, kept)._replace(left=left)
+        models, unable = _forces(source, done.text, found, recordings)
         errors = _read_again(source, done.text, found, recordings, models)
-    return done, errors
+    return done, models, unable, errors
 
 
 def _contradicted(found: Mapping[str, Explanation]) -> dict[str, str]:

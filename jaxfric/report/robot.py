@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from ..explanation.quantities import percent
 from . import charts
 from .page import picture, scripts, style, verdict_name
 
@@ -61,7 +62,7 @@ def _row(row: Mapping[str, Any], link: str | None) -> str:
         text = escape(row["error"])
         return f'<tr><td>{joint}</td><td>refused</td><td colspan="3">{text}</td></tr>'
     errors = [
-        "" if each is None else f"{each['before']:.2%} → {each['after']:.2%}"
+        "" if each is None else f"{percent(each['before'])} → {percent(each['after'])}"
         for each in (row["filtered_force_error"], row["filtered_holdout_force_error"])
     ]
     said = "<br>".join(escape(text) for text in row["findings"]) or "–"

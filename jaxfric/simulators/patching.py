@@ -116,8 +116,9 @@ def _changed(mujoco: Any, text: str, model: Any, group: Mapping[str, float]) -> 
 
 
 def _of_joint(mujoco: Any, model: Any, joint: int, own: Mapping[str, float], found: list[Tag]):
-    if any(value < 0 for name, value in own.items() if name not in ANGLES):
-        raise ValueError("it would be below zero")
+    below = [name for name, value in own.items() if name not in ANGLES and value < 0]
+    if below:
+        raise ValueError(f"its {below[0]} would be below zero")
     degrees = is_hinge(mujoco, model, joint) and _in_degrees(found)
     scale = 180 / np.pi if degrees else 1.0
     own = dict(own)

@@ -65,7 +65,8 @@ class Weight(NamedTuple):
             return Weight(mass, centre, inertia, self.axes)
         given = [k for k, letter in enumerate("xyz") if f"inertia_{letter}" in own]
         if mass <= 0 or np.any(inertia < 0):
-            raise ValueError("it would be below zero")
+            what = "mass" if mass <= 0 else f"inertia {'xyz'[int(np.argmin(inertia))]}"
+            raise ValueError(f"the body's {what} would be below zero")
         return Weight(mass, centre, possible(inertia, given) if given else inertia, self.axes)
 
 

@@ -203,7 +203,9 @@ def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
     mass = next((name for name in values if name.endswith("/mass")), None)
     if mass is not None:
         body = mass.split("/")[1]
-        return f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}: {PICKED}"
+        there = f"if its centre of mass is where that of body {body} is"
+        text = f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}"
+        return f"{text}: {PICKED}, {there}"
     weight = next((name for name in ("amplitude", "payload_offset") if name in values), None)
     if weight is None:
         return None

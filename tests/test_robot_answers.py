@@ -1,0 +1,159 @@
+"""What is told and written of a robot's joints is no more than what is known of them."""
+
+import types
+
+import numpy as np
+import pytest
+
+from jaxfric.cli import robot, robot_text
+from jaxfric.explanation import Explanation, attributes, contradictions
+from jaxfric.explanation.finding import Finding, Moved
+from jaxfric.explanation.quantities import percent
+from jaxfric.export import errors
+from jaxfric.identification.uncertainty import Estimate
+from jaxfric.simulators import Attribute
+from jaxfric.simulators.weights import Weight
+
+OWN = {
+    "joint/elbow/damping": Attribute("joint elbow", "damping", 0.6, "N·m·s/rad"),
+    "joint/elbow/armature": Attribute("joint elbow", "armature", 0.06, "kg·m²"),
+    "body/tool/mass": Attribute("body tool", "mass", 0.3, "kg"),
+}
+
+
+def moved(name, change, error, freedom=20.0):
+    unit = OWN[name].unit
+    return Moved(0.0, Estimate(np.float64(change), np.float64(error), unit, freedom))
+
+
+def reworded(**changes):
+    """The finding of changes of the elbow's damping and armature and the tool's mass."""
+    names = dict(zip(("damping", "armature", "mass"), OWN, strict=True))
+    parameters = {names[n]: moved(names[n], *each) for n, each in changes.items()}
+    finding = Finding("parameter_mismatch", "", "", (), "", parameters, 0.9, None, 0.002)
+    return attributes._reworded(finding, OWN)
+
+
+def test_a_value_that_may_be_as_it_was_is_not_told_as_wrong():
+    found = reworded(damping=(0.5, 0.01), armature=(0.0043, 0.023))
+    assert set(found.parameters) == {"joint/elbow/damping"}
+    assert found.untold == ("joint/elbow/armature",)
+    assert "0.06" not in found.sentence and "perhaps armature of joint elbow" in found.sentence
+    assert found.attribute == "joint/elbow/damping"
+
+
+def test_a_value_of_which_nothing_is_known_is_not_told_as_wrong():
+    found = reworded(damping=(1582.0, np.inf))
+    assert not found.parameters and found.untold == ("joint/elbow/damping",)
+
+
+def test_a_gain_that_may_be_none_is_not_told():
+    own = OWN | {"gain": Attribute("actuator m", "gear", 1.0, "1")}
+    for error, told in {2500.0: (), 25.0: ("actuator/m/gear",)}.items():
+        parameters = {"gain": Moved(0.0, Estimate(np.float64(2499.0), error, "1", 20.0))}
+        finding = Finding("parameter_mismatch", "", "", (), "", parameters, 0.9, None, 0.002)
+        found = attributes._reworded(finding, own)
+        assert tuple(found.parameters) == told and (found.attribute is None) != bool(told)
+
+
+def test_a_value_that_nothing_can_have_is_not_told_as_the_right_one():
+    found = reworded(damping=(0.5, 0.01), mass=(-0.4, 0.06))
+    assert set(found.parameters) == {"joint/elbow/damping"} and found.untold == ("body/tool/mass",)
+    assert "which cannot be below zero: something else is wrong" in found.sentence
+
+
+def test_a_change_to_what_cannot_be_is_a_change_of_something_else():
+    steps = {"step_viscous": moved("joint/elbow/damping", -2.0, 0.1),
+             "step_time": moved("joint/elbow/damping", 14.5, 0.1)}  # fmt: skip
+    steps = {name: each.estimate for name, each in steps.items()}
+    finding = Finding("friction_step", "", "", (), "", steps, 0.1, None, 0.002)
+    found = attributes._stepped(finding, OWN, {name: own.value for name, own in OWN.items()})
+    assert "would have to change from 0.6" in found.sentence and found.attribute is None
+    assert found.untold == ("joint/elbow/damping",) and set(found.parameters) == set(steps)
+
+
+def test_an_answer_of_values_that_cannot_be_told_does_not_explain():
+    assert attributes.claimed("explained", [reworded(damping=(0.5, 0.01))]) == "explained"
+    unsure = [reworded(damping=(0.5, 0.01), armature=(0.0043, 0.023))]
+    assert attributes.claimed("explained", unsure) == "partly_explained"
+    assert attributes.claimed("unexplained", unsure) == "unexplained"
+
+
+def test_a_file_that_makes_a_joint_worse_by_itself_is_worse():
+    beside = {"before": 0.6178, "file": 0.875, "forces": 0.556}
+    assert errors.worse({"force_error": beside})
+    assert not errors.worse({"force_error": beside | {"file": 0.6}})
+    assert errors.worse({"force_error": beside | {"file": 0.6, "forces": 0.65}})
+    assert "61.78% → 87.50% held out" in errors.from_to({"holdout_force_error": beside})
+
+
+def test_errors_beyond_all_sense_are_said_in_words():
+    assert percent(0.1234) == "12.34%" and percent(9.0) == "900.00%"
+    assert percent(4092853.4) == percent(np.inf) == percent(np.nan) == "over 1000%"
+
+
+def joint(verdict="explained"):
+    fit = {"filtered_force_error": {"before": 0.6, "after": 0.3}}
+    fit["filtered_holdout_force_error"] = {"before": 0.62, "after": 0.32}
+    told = types.SimpleNamespace(verdict=verdict, fit=fit, findings=[], warnings=[])
+    return robot.Joint("elbow", told, "", [], None, [])
+
+
+def written(file, forces=None):
+    """A patch whose file leaves so much of the elbow's force."""
+    beside = {} if forces is None else {"forces": forces}
+    error = {"before": 0.6, "file": file, **beside}
+    told = {"elbow": {"force_error": error, "holdout_force_error": error}}
+    return robot.Patch("", None, [], [], told, "new_forces.py")
+
+
+def test_a_joint_whose_error_does_not_fall_is_not_explained():
+    assert robot._row(joint(), written(0.1))["verdict"] == "explained"
+    assert robot._row(joint(), written(0.6, 0.1))["verdict"] == "explained"
+    assert robot._row(joint(), written(0.6))["verdict"] == "partly_explained"
+    assert robot._row(joint(), None)["verdict"] == "explained"
+
+
+def test_the_table_has_what_the_file_leaves_by_itself():
+    row = robot._row(joint(), written(0.5, 0.1))
+    said = robot_text.joints("user.xml", "a.csv", [row]).splitlines()
+    assert said[2].split() == ["joint", "verdict", "error", "after", "callback",
+                               "held", "out", "after", "callback", "what"]  # fmt: skip
+    assert said[3].split()[2:] == ["60.00%", "50.00%", "10.00%", "62.00%", "50.00%", "10.00%"]
+    assert "callback" not in robot_text.joints("user.xml", "a.csv", [robot._row(joint(), None)])
+
+
+def test_which_number_would_be_below_zero_is_said():
+    weight = Weight(1.5, np.array([0.13, 0.0, 0.0]), np.array([0.002, 0.012, 0.012]), np.eye(3))
+    with pytest.raises(ValueError, match="inertia y would be below zero"):
+        weight.with_values({"centre_x": 169.8, "inertia_y": -17.3})
+    with pytest.raises(ValueError, match="mass would be below zero"):
+        weight.with_values({"mass": -0.1})
+
+
+def told_by(mass, error, verdict="explained", at=12.0):
+    """An explanation by which the mass of a body changes from 1.5 kg at a moment."""
+    own = Moved(1.5, Estimate(np.float64(mass), np.float64(error), "kg", 20.0))
+    moment = Estimate(np.float64(at), np.float64(0.1), "s", 20.0)
+    parameters = {"body/fore/mass": own, "step_time": moment}
+    finding = Finding("payload_change", "", "", (), "", parameters, 0.9, None, 0.002)
+    empty = dict.fromkeys(("where", "not_visible"), [])
+    rest = dict.fromkeys(("fit", "baseline_parameters", "recording"), {})
+    return Explanation(verdict, findings=[finding], model=None, baseline=None, baseline_name="",
+                       **empty, **rest)  # fmt: skip
+
+
+def test_joints_that_contradict_each_other_on_a_body_explain_nothing():
+    told = {"waist": told_by(2.655, 0.025), "elbow": told_by(2.947, 0.014)}
+    found = contradictions.with_contradictions(told)
+    assert {each.verdict for each in found.values()} == {"partly_explained"}
+    (warning,) = found["waist"].warnings
+    assert warning == found["elbow"].warnings[0] and not warning["severe"]
+    assert "mass of body fore: 2.65" in warning["text"] and "by waist and 2.94" in warning["text"]
+
+
+def test_joints_that_agree_on_a_body_or_tell_of_two_moments_do_not_contradict():
+    alike = {"waist": told_by(2.655, 0.025), "elbow": told_by(2.63, 0.02)}
+    assert contradictions.with_contradictions(alike) == alike
+    apart = {"waist": told_by(2.655, 0.025), "elbow": told_by(1.6, 0.014, at=5.0)}
+    assert contradictions.with_contradictions(apart) == apart
