@@ -107,13 +107,6 @@ def written(file, forces=None):
     return robot.Patch("", None, [], [], told, "new_forces.py")
 
 
-def test_a_joint_whose_error_does_not_fall_is_not_explained():
-    assert robot._row(joint(), written(0.1))["verdict"] == "explained"
-    assert robot._row(joint(), written(0.6, 0.1))["verdict"] == "explained"
-    assert robot._row(joint(), written(0.6))["verdict"] == "partly_explained"
-    assert robot._row(joint(), None)["verdict"] == "explained"
-
-
 def test_the_table_has_what_the_file_leaves_by_itself():
     row = robot._row(joint(), written(0.5, 0.1))
     said = robot_text.joints("user.xml", "a.csv", [row]).splitlines()

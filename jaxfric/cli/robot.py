@@ -104,19 +104,17 @@ def _document(arguments: Namespace, joint: Joint) -> dict[str, Any]:
 
 def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
     """One joint of the summary; `file`: what the written file leaves of its force, and `callback`
-    what it does with the callback too. Where that is no less than before nothing is `explained`.
+    what it does with the callback too.
     """
     if joint.told is None:
         return {"joint": joint.name, "verdict": "refused", "error": joint.error}
-    errors, verdict = joint.told.fit, joint.told.verdict
-    if verdict == "explained" and done is not None and not done.falls(joint.name):
-        verdict = "partly_explained"
+    errors = joint.told.fit
     written = {} if done is None else {"file": done.after(joint.name)}
     if done is not None and (callback := done.with_forces(joint.name)):
         written["callback"] = callback
     return {
         "joint": joint.name,
-        "verdict": verdict,
+        "verdict": joint.told.verdict,
         "findings": [*_severe(joint.told), *map(_said, joint.told.findings)],
         "filtered_force_error": errors["filtered_force_error"],
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],

@@ -24,11 +24,6 @@ def worse(errors: Mapping[str, Mapping[str, float]]) -> bool:
     return any(_more(max(each["file"], reached(each)), each["before"]) for each in errors.values())
 
 
-def falls(error: Mapping[str, float]) -> bool:
-    """Whether what was written leaves less of a recording's force than the file as it was."""
-    return _more(error["before"], reached(error))
-
-
 def from_to(errors: Mapping[str, Mapping[str, float]]) -> str:
     """Errors before and after in words, of the file or with the forces, whichever is more."""
     return ", ".join(

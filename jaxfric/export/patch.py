@@ -22,7 +22,7 @@ from ..terms.base import AbstractTerm, Sum
 from ..terms.effects import EFFECTS, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback, readback
-from .errors import falls, from_to, miss, reached, worse
+from .errors import from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
 from .rerun import Rerun, rerun
@@ -77,10 +77,6 @@ class Patch(NamedTuple):
         """What the file leaves with the forces beside it, by recording; empty without any."""
         errors = self.errors[joint].items()
         return {name: each["forces"] for name, each in errors if "forces" in each}
-
-    def falls(self, joint: str) -> bool:
-        """Whether what was written leaves less of the force of a joint's recording than before."""
-        return falls(next(iter(self.errors[joint].values())))
 
 
 def patch(
