@@ -96,3 +96,31 @@ def test_a_load_that_is_damped_much_does_not_swing(damping, swings):
     }
     told = sentence("compliance", values, 0.05, ())
     assert ("The load swings" in told) == swings and "4.57 Hz" in told
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "words"),
+    [
+        (
+            "viscous_nonlinearity",
+            {"quadratic_drag": (51.5, "N*s²/m²")},
+            "times the square of speed",
+        ),
+        ("viscous_nonlinearity", {"quadratic_drag": (-5.0, "N*s²/m²")}, "square of speed;"),
+        (
+            "thermal_drift",
+            {"thermal_coulomb": (3.0, "N"), "time_constant": (12.0, "s")},
+            "Coulomb friction differs by 3.000 N",
+        ),
+        (
+            "thermal_drift",
+            {"thermal_viscous": (-3.0, "N"), "time_constant": (12.0, "s")},
+            "viscous friction differs by -3.000 N",
+        ),
+    ],
+)
+def test_curved_and_warming_friction_are_told_with_their_sizes(effect, values, words):
+    told = {
+        name: estimate(value, 0.01 * abs(value), unit) for name, (value, unit) in values.items()
+    }
+    assert words in sentence(effect, told, 0.5, ())

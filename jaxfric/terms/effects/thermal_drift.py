@@ -1,5 +1,6 @@
 """Friction that falls as the machine warms."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -8,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ...units import TIME
 from ..base import AbstractTerm
-from ..effect import Effect
+from ..effect import Effect, Extent
 from ..friction import Coulomb, Viscous
 from ..sample import UNKNOWN, Parameter, Scales
 from ..text import signed
@@ -53,6 +54,17 @@ def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:
     return tuple(ThermalDrift(kind, start=start) for kind in (Viscous(), Coulomb()))
 
 
+def _of_law(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence with which friction it is, and by how much."""
+    for name, words in (("thermal_viscous", "viscous"), ("thermal_coulomb", "Coulomb")):
+        if name in values:
+            return (
+                f"At the start {words} friction differs by {{{name}}} from where it settles, with a "
+                "time constant of {time_constant}: warming"
+            )
+    return None
+
+
 THERMAL_DRIFT = Effect(
     "thermal_drift",
     "β g(v) exp(−(t − t₀)/τ), g viscous or Coulomb",
@@ -64,4 +76,5 @@ THERMAL_DRIFT = Effect(
     confusable_with=("friction_step", "viscous_nonlinearity"),
     separate_by="Repeat from cold: warming repeats, a step does not.",
     momentary=True,
+    variant=_of_law,
 )

@@ -1,5 +1,6 @@
 """Friction that is curved in speed."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -8,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ...units import DAMPING, DIMENSIONLESS, FORCE, VELOCITY, Dimension
 from ..base import AbstractLaw
-from ..effect import Effect
+from ..effect import Effect, Extent
 from ..sample import UNKNOWN, Parameter, Sample
 from ..text import literal
 
@@ -76,11 +77,32 @@ class ShearThinning(AbstractLaw):
         return (f"v / (1.0 + {s.call('abs', 'v')} / {scale})",)
 
 
+_CURVED = "Friction is curved in speed, beyond a Coulomb and a viscous part"
+# What a law adds, by the name of its size; and of what it is as, where that is positive.
+_PARTS = {
+    "quadratic_drag": ("{quadratic_drag} times the square of speed", "air or churning oil"),
+    "thinning_viscous": (
+        "{thinning_viscous}, half as much from {thinning_velocity} on",
+        "a lubricant that thins",
+    ),
+    "power_force": ("speed to the power of {exponent}", ""),
+}
+
+
+def _by_law(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence with what the law adds."""
+    for name, (added, source) in _PARTS.items():
+        if name in values:
+            like = f", as of {source}" if source and values[name] > 0 else ""
+            return f"{_CURVED}: by {added}{like}"
+    return None
+
+
 VISCOUS_NONLINEARITY = Effect(
     "viscous_nonlinearity",
     "c v abs(v), b v/(1 + abs(v)/v₀) or k sign(v) abs(v)ⁿ",
     "friction",
-    "Friction is curved in speed, beyond a Coulomb and a viscous part",
+    _CURVED,
     laws=(QuadraticDrag, ShearThinning, PowerLaw),
     scaled=lambda scales: (
         QuadraticDrag(),
@@ -90,4 +112,5 @@ VISCOUS_NONLINEARITY = Effect(
     coordinates=("velocity",),
     confusable_with=("thermal_drift", "stribeck"),
     separate_by="Run to the top speed from cold and again warm.",
+    variant=_by_law,
 )
