@@ -59,8 +59,8 @@ def _of_law(values: Mapping[str, float], extent: Extent) -> str | None:
     for name, words in (("thermal_viscous", "viscous"), ("thermal_coulomb", "Coulomb")):
         if name in values:
             return (
-                f"At the start {words} friction differs by {{{name}}} from where it settles, with a "
-                "time constant of {time_constant}: warming"
+                f"At the start {words} friction differs by {{{name}}} from where it settles, "
+                "with a time constant of {time_constant}: warming"
             )
     return None
 
