@@ -169,6 +169,19 @@ def test_a_base_that_is_tilted_is_no_fault_of_the_bodies():
     assert robot.gravity(found.values) == pytest.approx(-9.81 * np.cos(tilt), abs=1e-3)
 
 
+@pytest.mark.parametrize("gravity", [9.81, 9.80, -9.81])
+def test_a_base_on_a_wall_is_told_with_a_finite_error(gravity):
+    """Gravity's largest component is next to nothing then, and its derivative infinite."""
+    down = -np.sqrt(max(9.81**2 - gravity**2, 0.0))
+    robot = rows(arm(), pulled(f"{gravity} 0 {down}"))
+    found = answer(robot, {"upper", "fore"})
+    assert {name.split("/")[0] for name in found.values} == {"option"}
+    assert found.values["option/gravity/x"] == pytest.approx(gravity, abs=0.02)
+    moved = agreement._down(robot, {"option/gravity/x": gravity}, found.estimates)
+    assert np.isfinite(moved.estimate.standard_error)
+    assert abs(moved.value - down) <= 3 * moved.estimate.standard_error
+
+
 def test_a_gravity_of_another_size_is_one_number():
     found = answer(rows(pulled("0 0 -9"), arm()), {"upper", "fore"})
     assert list(found.values) == ["option/gravity/z"]

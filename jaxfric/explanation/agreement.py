@@ -111,12 +111,16 @@ def _moved(rows: Bodies, others, state: State) -> dict[str, Moved]:
 
 
 def _down(rows: Bodies, values: State, known: Mapping[str, Estimate]) -> Moved:
-    """Gravity's largest component, which follows from the others."""
+    """Gravity's largest component z = √(g² − Σ x²), which follows from the others.
+
+    Its error is Σ x δx / z; of a base on a wall, where z is next to nothing, √(2 Σ x δx).
+    """
     value, others = rows.gravity(values), [name for name in values if name in GRAVITY]
-    spread = sum(values[n] * float(known[n].standard_error) for n in others) / value
+    turned = sum(abs(values[n]) * float(known[n].standard_error) for n in others)
+    error = np.sqrt(2 * turned) if value**2 < 0.5 * turned else turned / abs(value)
     freedom = min(known[n].degrees_of_freedom for n in others)
-    error = np.float64(abs(spread))
-    return Moved(rows.before[rows.down], Estimate(np.float64(value), error, "m/s²", freedom))
+    estimate = Estimate(np.float64(value), np.float64(error), "m/s²", freedom)
+    return Moved(rows.before[rows.down], estimate)
 
 
 def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bodies | None:

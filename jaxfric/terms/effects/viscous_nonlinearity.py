@@ -82,7 +82,7 @@ _CURVED = "Friction is curved in speed, beyond a Coulomb and a viscous part"
 _PARTS = {
     "quadratic_drag": ("{quadratic_drag} times the square of speed", "air or churning oil"),
     "thinning_viscous": (
-        "{thinning_viscous}, half as much from {thinning_velocity} on",
+        "{thinning_viscous}, half as much at {thinning_velocity}",
         "a lubricant that thins",
     ),
     "power_force": ("speed to the power of {exponent}", ""),
