@@ -1364,6 +1364,20 @@ def test_a_term_after_others_takes_a_part_of_the_whole_or_most_of_the_rest():
     assert least("periodic_disturbance", "thermal_drift", left=0.004) == 0.01
 
 
+def test_a_term_after_one_that_is_much_like_the_base_takes_a_hundredth_of_its_amplitude():
+    """Of a drag a refitted viscous friction leaves little; its law holds to a hundredth of all."""
+    drag = np.full(100, 3.0)
+    current = types.SimpleNamespace(energy=0.02, terms=("base", "drag"), part=lambda number: drag)
+    rows, base = types.SimpleNamespace(force=np.full(100, 4.0)), types.SimpleNamespace(energy=1.0)
+    trial = types.SimpleNamespace(effect=EFFECTS["stribeck"], least=0.0)
+    before = [types.SimpleNamespace(effect=EFFECTS["viscous_nonlinearity"])]
+    assert acceptance.needed(trial, current, rows, base, before) == pytest.approx(0.09)
+    smaller = types.SimpleNamespace(
+        energy=0.02, terms=("base", "drag"), part=lambda number: drag / 10
+    )
+    assert acceptance.needed(trial, smaller, rows, base, before) == pytest.approx(0.02 / 3)
+
+
 def test_a_wrong_value_shows_through_a_wider_kernel_too(healthy):
     """What only the narrow rows show is the acceleration's noise, and no value."""
     run = healthy[0]

@@ -7,7 +7,7 @@ import jaxfric as jf
 from jaxfric.simulation.errors import in_motion
 from jaxfric.simulation.prediction import Prepared
 from jaxfric.simulators.columns import GAIN, distinct
-from jaxfric.simulators.inverse import Motion, along
+from jaxfric.simulators.inverse import Motion, along, forces
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -131,3 +131,21 @@ def test_where_its_friction_creeps_to_rest_nothing_is_compared():
     left = np.linalg.norm((force - known)[moving])
     assert left < 0.015 * np.linalg.norm(force[moving])
     assert left < 0.7 * wrong
+
+
+def test_where_its_friction_drives_before_the_axis_has_turned_nothing_is_compared():
+    """At 60 rad/s² it changes its sign 0.5 rad/s before the motion does: no machine's friction."""
+    text, _ = stopping(count=2)
+    time, rate = 5e-4 * np.arange(8000), 10.0
+    speed = 6.0 * np.sin(rate * time)
+    position = -0.6 * np.cos(rate * time)
+    smooth_model = mujoco.MjModel.from_xml_string(text.replace('frictionloss="3"', ""))
+    motion = Motion(*(x[:, None] for x in (position, speed, 60.0 * np.cos(rate * time))))
+    force = forces(mujoco, smooth_model, motion)[:, 0] + 3.0 * np.sign(speed)
+    units = {"force": "N·m", "position": "rad"}
+    recording = jf.Recording(time, force, position, units=units)
+    seen = jf.simulators.mujoco(text).beside(recording)
+    moving = in_motion(seen)
+    left = (force - np.asarray(seen.channels["known_force"]))[moving]
+    assert moving.mean() > 0.9
+    assert np.max(np.abs(left)) < 0.05 * 3.0

@@ -110,6 +110,19 @@ def test_a_revolute_axis_has_gravity_and_a_spring_too():
     assert "gravity_sin" not in Known().model((("force", "N"), ("position", "m"))).parameters
 
 
+def test_columns_that_only_cancel_each_other_are_no_wrong_values():
+    """Of a force and its parts, all moved against it, no more than a wrong shape is left."""
+    time, draw = np.arange(2400) / 100, np.random.default_rng(3)
+    rate, sign, speed = np.cos(time), np.sign(np.sin(time)), np.sin(time)
+    bump = 0.02 * sign * np.exp(-((speed / 0.1) ** 2))
+    whole = rate + sign + 0.3 * speed + bump
+    columns, block = np.stack([rate, sign, speed, whole], axis=1), np.arange(2400) // 100
+    noise = 1e-3 * draw.normal(size=2400)
+    assert 3 not in fewest(columns, 0.2 * rate + bump + noise, block, 0.0)
+    assert fewest(columns, 0.2 * rate - 0.02 * speed + noise, block, 0.0) == [0, 2]
+    assert fewest(columns, 0.2 * whole + noise, block, 0.0) == [3]
+
+
 def test_the_fewest_columns_are_enough():
     """Of columns that resemble each other the one that is the difference, and it alone."""
     draw = np.random.default_rng(0)

@@ -64,15 +64,18 @@ def needed(
     trial: Trial, current: Fit, evidence: Evidence, base: Fit, selected: list[SelectedTerm]
 ) -> float:
     """The energy that a candidate must remove beside the terms selected before, N²."""
-    share = max(_least_share(selected), trial.least)
-    least = max(share * current.energy, LINEARITY**2 * float(evidence.force @ evidence.force))
+    share, force = max(_least_share(selected), trial.least), float(evidence.force @ evidence.force)
+    least = max(share * current.energy, LINEARITY**2 * force)
     if trial.effect.ubiquitous:
         least = max(least, fast(current) ** 2 * len(current.residual))
     if not selected:
         return least
     before = [each.effect for each in selected]
     ours = least_gain(trial.effect, before, base.energy, current.energy, LEAST_OF_BASE)
-    return max(least, ours)
+    # Of a law that is much like the base, the base's residual holds a small part.
+    found = (current.part(i) for i in range(len(current.terms) - len(selected), len(current.terms)))
+    largest = min(force, max(float(part @ part) for part in found))
+    return max(least, ours, LEAST_OF_BASE * largest)
 
 
 def _least_share(selected: list[SelectedTerm]) -> float:

@@ -12,7 +12,7 @@ from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation
 from .finding import Finding, Moved
-from .sentences import indistinct, quantity
+from .sentences import indistinct, quantity, unexplained
 
 # A correction that is no attribute by itself, as the gain of all of the force.
 CONSTANT = "offset"
@@ -58,7 +58,7 @@ def _reworded(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
     texts = [_text(n, m, own) + _doubt(n, finding.instead, own) for n, m in moved.items()]
     rivals = tuple(r for r in finding.confusable_with if not _same(r, moved))
     texts += _untold({n: m for n, m in every.items() if n not in moved}, own)
-    texts.append(f"{finding.share:.0%} of the unexplained force{indistinct(rivals)}.")
+    texts.append(f"{unexplained(finding.share)}{indistinct(rivals)}.")
     geared = {_gear(own)} - {GAIN}
     names = [n for n in moved if n in own or n in geared or n.endswith(REFERENCE)]
     return finding._replace(
@@ -212,7 +212,7 @@ def _stepped(finding: Finding, own: Mapping[str, Attribute], now: Mapping[str, f
     value = quantity(after, smaller=False)
     reason = finding.sentence.partition(";")[0].partition(": ")[2]
     text = f"At t = {quantity(moment_)} {attribute.owner}'s {attribute.what} "
-    share = f"{finding.share:.0%} of the unexplained force{indistinct(finding.confusable_with)}."
+    share = f"{unexplained(finding.share)}{indistinct(finding.confusable_with)}."
     if impossible(key, moved):
         text += f"would have to change from {before:.4g} to {value}, which cannot be below zero: "
         return finding._replace(sentence=f"{text}something else changes; {share}", untold=(key,))

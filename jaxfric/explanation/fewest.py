@@ -12,13 +12,18 @@ from .least_squares import RANK
 MOST_WRONG = 5
 # The normal quantile of 1 % shared among twenty parameters.
 SURE = 3.5
+# No column has quite the shape of its force, and a tenth of its amplitude may be something else.
+# Values that move against each other and explain less than that of the largest move, as all of them
+# against the gain, say no more than that a shape is wrong.
+SHAPE = 0.1
 
 
 def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: float) -> list[int]:
     """Numbers of the fewest columns that leave what all of them leave, N², but for `enough`.
 
-    Of every size the best subset; none of whose columns is within its interval of nothing. Where
-    more than `MOST_WRONG` are needed, it is another machine, and all of them.
+    Of every size the best subset; none of whose columns is within its interval of nothing, and
+    which do not only cancel each other. Where more than `MOST_WRONG` are needed, it is another
+    machine, and all of them.
     """
     size = np.linalg.norm(own, axis=0)
     used = np.flatnonzero(size > 0)
@@ -26,14 +31,21 @@ def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: flo
     gram, pull = columns.T @ columns, columns.T @ residual
     most = _removed(gram, pull, range(len(used)))
     found: tuple[int, ...] = ()
+    parts, taken = np.zeros(len(used)), 0.0
     for count in range(1, min(len(used), MOST_WRONG) + 1):
-        if most - _removed(gram, pull, found) < enough:
+        if most - taken < enough:
             break
         better = _best(gram, pull, count, found)
-        if not _sure(columns[:, better], residual, block):
+        inverse = np.linalg.pinv(columns[:, better], rcond=RANK)
+        other = np.zeros(len(used))
+        other[list(better)] = inverse @ residual
+        if not _sure(columns @ other, inverse, other[list(better)], residual, block):
             break
-        found = better
-    if len(found) == MOST_WRONG and most - _removed(gram, pull, found) >= enough:
+        more = _removed(gram, pull, better) - taken
+        if more < (SHAPE * np.max(np.abs(other - parts))) ** 2:
+            break
+        found, parts, taken = better, other, taken + more
+    if len(found) == MOST_WRONG and most - taken >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
 
@@ -69,11 +81,9 @@ def _removed(gram: np.ndarray, pull: np.ndarray, some: Iterable[int]) -> float:
     return float(solved @ pull[index])
 
 
-def _sure(columns: np.ndarray, residual: np.ndarray, block: np.ndarray) -> bool:
+def _sure(fitted: np.ndarray, inverse: np.ndarray, parts: np.ndarray, residual, block) -> bool:
     """Whether each column's part is beyond noise like what all of them leave, by blocks."""
-    inverse = np.linalg.pinv(columns, rcond=RANK)
-    parts = inverse @ residual
-    noise = residual - columns @ parts
+    noise = residual - fitted
     count = int(block[-1]) + 1
     sums = np.stack([np.bincount(block, row * noise, count) for row in inverse])
     return bool(np.all(np.abs(parts) > SURE * np.sqrt(np.sum(sums**2, axis=1))))

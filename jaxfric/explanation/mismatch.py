@@ -6,8 +6,8 @@ import numpy as np
 
 from ..models import Model
 from . import parameters as spelled
-from .acceptance import LEAST_SHARE, LINEARITY
-from .baseline import as_given
+from .acceptance import LEAST_OF_BASE, LEAST_SHARE, LINEARITY
+from .baseline import as_given, at_values
 from .evidence import Evidence
 from .fewest import MOST_WRONG, SURE, fewest
 from .least_squares import orthonormal, solve
@@ -21,8 +21,8 @@ class Mismatch(NamedTuple):
     """Parameters whose values are wrong, and what that costs.
 
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
-    `share`: part of the mean-square residual before that the right values remove; `p_value`;
-    `energy`: of the residual before, N²; `rivals`: effects that take as much with no more numbers,
+    `share`: part of the baseline's mean-square residual that the right values remove, beside the
+    terms found; `p_value`; `energy`: of the residual before, N²; `rivals`: effects that take as much with no more numbers,
     with none of these values wrong; `within`: numbers of those that move with the others, by
     no more than is uncertain; `instead`: to each that moved, what would do as well.
     """
@@ -43,18 +43,21 @@ def mismatch(
 
     `refitted`: with all values free, beside the terms found: values and missing physics are tested
     together. The refitted parameters differ from the given ones (all of them together at 1 %) and
-    take enough of the residual. Of those the fewest are moved that leave no more than all of them
+    take enough of the residual, and of the baseline's: below a hundredth of its amplitude no term
+    is known to follow its law. Of those the fewest are moved that leave no more than all of them
     do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the width,
     which have to show them too.
     """
     given, own, beside = _apart(model, refitted, evidence)
-    share = 1 - refitted.energy / given.energy if given.energy > 0 else 0.0
+    first = at_values(model, evidence).energy
+    gained = given.energy - refitted.energy
+    least = max(LEAST_SHARE * given.energy, LEAST_OF_BASE * first)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
     empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
     scan = BlockBootstrap(empty, block, seed)(raw.astype(np.float32))
     p_value = float((1 + np.sum(scan.drawn >= scan.gain[0])) / (1 + len(scan.drawn)))
-    if share < LEAST_SHARE or p_value > LEVEL:
+    if not gained > least or p_value > LEVEL:
         return None
     before = [*given.alphas[0], *given.betas[0]]
     enough = LINEARITY**2 * float(evidence.force @ evidence.force)
@@ -69,7 +72,7 @@ def mismatch(
         free = [i for i in free if i not in vague] or free
         instead = _instead(own, given.residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
-    return Mismatch(moved, float(share), p_value, given.energy, instead=instead)
+    return Mismatch(moved, float(gained / first), p_value, given.energy, instead=instead)
 
 
 def _apart(model: Model, refitted: Fit, evidence: Evidence) -> tuple[Fit, np.ndarray, np.ndarray]:

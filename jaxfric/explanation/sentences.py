@@ -31,7 +31,13 @@ def sentence(
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     text = re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
-    return f"{text}; {share:.0%} of the unexplained force{indistinct(rivals)}."
+    return f"{text}; {unexplained(share)}{indistinct(rivals)}."
+
+
+def unexplained(share: float) -> str:
+    """A share in words, in whole per cents."""
+    size = "under 1%" if share < 0.005 else f"{share:.0%}"
+    return f"{size} of the unexplained force"
 
 
 def indistinct(rivals: Sequence[str]) -> str:
@@ -68,7 +74,7 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
         else:
             value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    text = f"Wrong values: {'; '.join(parts)}; {share:.0%} of the unexplained force"
+    text = f"Wrong values: {'; '.join(parts)}; {unexplained(share)}"
     return f"{text}{indistinct(rivals)}."
 
 

@@ -100,9 +100,7 @@ def select(
         current, evidence, selected = _pruned(evidence, current, selected, round_.contest.size)
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)
-            less = without(current, evidence, len(current.terms) - len(selected) + number)
-            current, evidence = _predicting(less, evidence)
-            selected = [each for i, each in enumerate(selected) if i != number]
+            current, evidence, selected = _less(evidence, current, selected, number)
         if first and selected:
             break
     if in_slip is not None and len(selected) == known and selected:
@@ -205,3 +203,11 @@ def _pruned(
             current, evidence = _predicting(less, evidence)
             selected = [each for i, each in enumerate(selected) if i != index - start]
     return current, evidence, selected
+
+
+def _less(
+    evidence: Evidence, current: Fit, selected: list[SelectedTerm], number: int
+) -> tuple[Fit, Evidence, list[SelectedTerm]]:
+    """Without one of the selected terms."""
+    less = without(current, evidence, len(current.terms) - len(selected) + number)
+    return *_predicting(less, evidence), [*selected[:number], *selected[number + 1 :]]

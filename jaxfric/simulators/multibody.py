@@ -243,14 +243,17 @@ class Mujoco(AbstractSimulator):
         return actuation.driven(self.actuator, recording, self.along(recording), self.number)
 
     def _sticks(self, seen: inverse.Along) -> Bool[np.ndarray, " N"]:
-        """Where the model's dry friction is below its limit: it creeps to rest there, `(N,)`.
+        """Where the model's dry friction does not resist at its limit: it creeps to rest, `(N,)`.
 
         MuJoCo's friction is a stiff function of the acceleration then (Todorov 2014, soft
         constraints), ten times that of the inertia by default: of a recorded motion, whose
-        acceleration has to be derived, it may be anything up to break-away, as at rest.
+        acceleration has to be derived, it may be anything up to break-away, as at rest. Of one that
+        turns quickly it is at the limit already, against the acceleration, while the axis still
+        moves on: there it drives, as no friction of a machine does.
         """
         limit = float(self.model.dof_frictionloss[self.number])
-        return np.abs(seen.friction[:, self.number]) < (1 - ROUNDING) * limit
+        forward = np.sign(seen.motion.velocity[:, self.number])
+        return (limit > 0) & (forward * seen.friction[:, self.number] < (1 - ROUNDING) * limit)
 
     def _position(self, recording: Recording, joint: str) -> Recording:
         """The recording with the position of a joint as its own, and nothing derived from it."""

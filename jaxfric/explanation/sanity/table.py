@@ -11,7 +11,7 @@ from ...terms.effects.end_stop import END_STOP, place
 from ..quantities import quantity
 from . import limits
 from .contact import Contact
-from .faults import DRIFT, OFFSET, ZERO, FaultSearch
+from .faults import DRIFT, LEAVES, OFFSET, ZERO, FaultSearch
 from .rows import Part
 from .wiring import Wiring
 
@@ -84,7 +84,7 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     if 1 + value < 0 and chosen:
         text = f"The force is counted the other way: it is {quantity(times)} times the simulator's."
         return [Check("force_sign", text, True, value=times, parameter="gain")]
-    if chosen:
+    if chosen and seen.left <= LEAVES:
         text = f"The torque constant is {size} times the simulator's."
         return [
             Check("force_sign", "The force has the simulator's sign."),
@@ -93,6 +93,8 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     text = f"The torque constant is the simulator's ({size} times it, by itself)."
     if not np.isfinite(error):
         text = "The motion cannot tell the torque constant."
+    elif chosen:
+        text = "Wrong values leave most of the mismatch: of the torque constant they say nothing."
     return [
         Check("force_sign", "The force has the simulator's sign."),
         Check("force_gain", text, value=times, parameter="gain"),
