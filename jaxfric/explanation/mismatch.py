@@ -22,9 +22,10 @@ class Mismatch(NamedTuple):
 
     `moved`: number of each parameter among affine and nonlinear ones, with its value before;
     `share`: part of the baseline's mean-square residual that the right values remove, beside the
-    terms found; `p_value`; `energy`: of the residual before, N²; `rivals`: effects that take as much with no more numbers,
-    with none of these values wrong; `within`: numbers of those that move with the others, by
-    no more than is uncertain; `instead`: to each that moved, what would do as well.
+    terms found; `p_value`; `energy`: of the residual before, N²; `rivals`: effects that take as
+    much with no more numbers, with none of these values wrong; `within`: numbers of those that move
+    with the others, by no more than is uncertain; `instead`: to each that moved, what would do as
+    well.
     """
 
     moved: dict[int, float]
