@@ -164,6 +164,18 @@ def test_friction_of_another_level_is_no_hard_limit(motion):
         assert "force_limit" not in wrong(checked)
 
 
+def test_a_machine_that_warms_has_no_hard_limit(motion):
+    """Where friction is nearly all of the force, what a cold machine needs beyond is flat too."""
+    time, position, force = motion
+    speed = np.gradient(position[:, 1], time)
+    known = 0.02 * force[:, 1] + np.std(force[:, 1]) * np.sign(speed)
+    for lasting in (0.2, 0.6):
+        cold = np.exp(-time / (lasting * time[-1])) * speed / np.std(speed)
+        recording = Recording(time, known + np.std(known) * cold, position[:, 1], units=UNITS)
+        (checked,) = check_logs([Part(recording, None, Known(known))])
+        assert "force_limit" not in wrong(checked)
+
+
 def test_zeros_are_not_believed_where_few_columns_do_not_account_for_the_mismatch(motion):
     time, position, force = motion
     way = np.sign(np.gradient(position[:, 1], time))

@@ -59,6 +59,8 @@ def limit_of(
         return None
     level = float(np.mean(needed[beyond]))  # what arrived there
     beyond = size > level
+    if np.mean(beyond) > MOST:
+        return None
     inside = np.sum((level - needed[beyond]) ** 2)
     if not inside < LEAVES * np.sum(mismatch[beyond]):
         return None
@@ -74,8 +76,14 @@ def limit_of(
 
 
 def _by_values(command: np.ndarray, known: np.ndarray, speed: np.ndarray) -> float:
-    """What a gain, friction and a constant of other values leave of the mismatch, N²."""
+    """What a gain, friction and a constant of other values leave of the mismatch, N².
+
+    They may change with time, by a parabola: where friction is most of the force and falls while
+    the machine warms, what it needs seems to be one value, too.
+    """
     columns = np.stack([known, np.sign(speed), speed, np.ones_like(speed)], axis=1)
+    time = np.linspace(-1, 1, len(speed))[:, None]
+    columns = np.concatenate([columns, time * columns, time**2 * columns], axis=1)
     rest = command - known
     rest = rest - columns @ solve(columns, rest)
     return float(rest @ rest)
