@@ -539,3 +539,49 @@ def test_single_precision_converges_as_far_as_its_cost_can_tell():
         assert found.model.alpha.dtype == jnp.float32 and found.result_name == "successful"
         stopped = dataclasses.replace(found, result=jf.Result.not_converged)
     assert 'jax.config.update("jax_enable_x64", True)' in stopped.diagnosis
+
+
+def stopping(fast_stops: bool) -> jf.Recording:
+    """Slow moves to and fro and a fast one in each direction; the record ends in the last of them.
+
+    `fast_stops`: or after it.
+    """
+    time = np.arange(0.0, 12.0, 1e-3)
+    speed = 0.04 * np.sin(2 * np.pi * time / 2)
+    speed += np.where((time > 8) & (time < 9), 0.6 * np.sin(np.pi * (time - 8)) ** 2, 0.0)
+    speed -= np.where((time > 10) & (time < 11), 0.6 * np.sin(np.pi * (time - 10)) ** 2, 0.0)
+    force = 3.0 * np.gradient(speed, time) + 10.0 * np.sign(speed) + 40.0 * speed
+    force += 0.1 * np.random.default_rng(4).normal(size=len(time))
+    last = len(time) if fast_stops else 10_500
+    return jf.Recording(time[:last], force[:last], velocity=speed[:last])
+
+
+def test_windows_without_the_only_fast_move_of_a_direction_give_way_to_the_weak_form():
+    whole = jf.identify(jf.models.coulomb_viscous(), stopping(True))
+    assert not whole.weak and float(whole.covered) > 0.9
+    cut = jf.identify(jf.models.coulomb_viscous(), stopping(False))
+    assert cut.weak and cut.result == jf.Result.successful
+    for name, true in (("viscous-", 40.0), ("coulomb-", 10.0), ("inertia", 3.0)):
+        low, high = cut.parameters[name].interval()
+        assert low < true < high
+    narrow = jf.identify(
+        jf.models.coulomb_viscous(), stopping(False), projection=jf.ClosedWindows()
+    )
+    assert float(narrow.covered) < 0.1
+
+
+def test_friction_that_still_falls_at_the_fastest_speed_singles_no_bump_out():
+    """The Stribeck velocity lies beyond the bounds, where another shape takes its place."""
+    time = np.arange(0.0, 12.0, 1e-3)
+    speed = 0.05 * np.sin(2 * np.pi * time / 3)
+
+    def machine(width):
+        friction = np.sign(speed) * (4 + 6 / (1 + (speed / width) ** 2)) + 8.0 * speed
+        force = 3.0 * np.gradient(speed, time) + friction
+        force += 0.02 * np.random.default_rng(4).normal(size=len(time))
+        return jf.identify(jf.models.gaussian(), jf.Recording(time, force, velocity=speed))
+
+    wide = machine(0.06)
+    assert wide.result == jf.Result.ambiguous
+    assert "negative_parameter" in [each.name for each in wide.remarks]
+    assert "still falls" in str(wide)

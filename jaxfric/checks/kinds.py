@@ -264,7 +264,8 @@ KINDS = (
         "negative_parameter",
         False,
         "{value:.0f} of inertia, Coulomb and viscous friction are negative beyond their intervals, "
-        "as in no passive axis: the force or the velocity is late, or something is missing.",
+        "as in no passive axis: the force or the velocity is late, something is missing, or "
+        "friction still falls at the fastest speed, where a Stribeck curve has not ended.",
     ),
     Kind(
         "large_error",

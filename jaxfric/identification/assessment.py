@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float
 from .. import signals
 from ..checks import Design
 from ..terms.base import AbstractTerm, summands
+from ..terms.friction import STRIBECK_VELOCITY
 from ..terms.sample import Scales
 from . import reduced, uncertainty, weighing
 from .identified import Result
@@ -276,6 +277,26 @@ def outside(rival, beta, matrix) -> Bool[Array, ""]:
     errors = jnp.sqrt(jnp.diagonal(matrix)[matrix.shape[0] - beta.size :])
     bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
     return jnp.any(jnp.abs(rival - beta) > bound * errors)
+
+
+def still_falling(term, alpha, matrix) -> Bool[Array, ""]:
+    """Whether friction falls up to the fastest speed, so that no bump was seen to its end.
+
+    Viscous friction rises with speed; below zero beyond its interval, beside a Stribeck velocity of
+    the same direction, it is a flank of a bump wider than the bounds. Inside them another shape
+    then takes the place of that bump, and every parameter is of it.
+    """
+    bumps = {p.name[-1] for p in term.nonlinear if p.name.startswith(STRIBECK_VELOCITY.name)}
+    either = bumps - {"+", "-"}
+    slopes = [
+        p.name.startswith("viscous") and bool(either or p.name[-1] in bumps or p.name == "viscous")
+        for p in term.affine
+    ]
+    if not bumps or not any(slopes):
+        return jnp.zeros((), bool)
+    bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
+    most = alpha + bound * jnp.sqrt(jnp.diagonal(matrix)[: alpha.size])
+    return jnp.any((most < 0) & np.array(slopes))
 
 
 def verdict(finite, slipping, closed, hidden, border, converged, ambiguous, odd: Oddities):

@@ -47,8 +47,10 @@ class Result(eqx.Enumeration):
     )
     ambiguous = (
         "The cost has another minimum, elsewhere in the bounds, that the noise alone could have "
-        "made the lowest: a nonlinear parameter is not singled out. Give bounds around the value "
-        "that the machine's data sheet suggests, or record longer and over more of the stroke."
+        "made the lowest, or friction still falls at the fastest speed, and a bump wider than the "
+        "bounds would do as well: a nonlinear parameter is not singled out. Give bounds around the "
+        "value that the machine's data sheet suggests, or record longer, faster and over more of "
+        "the stroke."
     )
     not_described = (
         "The model leaves more than half of the force's power, so that its parameters describe the "
@@ -97,7 +99,8 @@ class Identified(eqx.Module):
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible. Outside of `jax.jit` it
       holds what a force that acts up to one and a half samples late makes of the parameters.
     - `result`: a member of [`Result`][].
-    - `windows`, `covered`: how many windows were used and which share of the slip time they hold.
+    - `windows`, `covered`: how many windows were used and which share of the slip they hold: of its
+      time or, in closed windows, of its squared speed in one direction, whichever is least.
     - `filtered_force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia
       included: what `predict` misses through the kernel that the rows have.
     - `cost`: the minimum of the reduced cost, N²·s.

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from ..checks.motion import RARE
 from ..data.recording import Recording
 from ..signals import continuous, interval, kernel, kernel_slope, kernel_weights
 from ..terms.base import AbstractTerm
@@ -33,7 +34,8 @@ class Rows(eqx.Module):
     - `moving`: weights of the rows over which errors are taken: reversals too, rest not, `(J,)`.
     - `time`: s, `(J,)`.
     - `windows`: how many windows (or, in the weak form, slip stretches) were used.
-    - `covered`: share of the valid slip time that the rows use.
+    - `covered`: share of the valid slip that the rows use: of its time or, in closed windows, of
+      its squared speed in a direction that is not rare, whichever is least.
     """
 
     target: Float[Array, " J"]
@@ -121,9 +123,15 @@ class ClosedWindows(AbstractProjection):
         used = jnp.sum(positive) + jnp.sum(negative)
         first = jnp.concatenate([jnp.ones(1, bool), jnp.diff(recording.segment) != 0])
         windows = jnp.sum(first & (end > begin))
-        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
         moving = jnp.where(jnp.abs(recording.velocity) > scales.slowest, scales.interval, 0.0)
         moving = jnp.where(recording.mask, moving, 0.0)
+        covered = jnp.minimum(used / jnp.where(slip > 0, slip, 1.0), 1.0)
+        square = jnp.where(moving > 0, recording.velocity**2, 0.0)
+        for weights, side in ((positive, 1.0), (negative, -1.0)):
+            ours = jnp.where(side * recording.velocity > 0, moving, 0.0)
+            whole, often = jnp.sum(ours * square), jnp.sum(ours) >= RARE * jnp.sum(moving)
+            part = jnp.sum(weights * square) / jnp.where(whole > 0, whole, 1.0)
+            covered = jnp.where(often & (whole > 0), jnp.minimum(part, covered), covered)
         force, time = recording.force, recording.time
         return Rows(force, positive, negative, moving, time, windows, covered)
 

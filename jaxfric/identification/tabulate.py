@@ -166,7 +166,7 @@ def _source(document: Mapping[str, Any]) -> list[str]:
 
 
 def _how(document: Mapping[str, Any], automatic: bool) -> str:
-    covered = f"{document['covered']:.0%} of the slip time"
+    covered = f"{document['covered']:.0%} of the slip"
     if document["projection"] == "closed_windows":
         count = document["windows"]
         which = f"{count} window{'s' * (count != 1)}"
@@ -230,7 +230,8 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
     if wrong:
         lines.append(
             f"{' and '.join(wrong)} negative, as in no passive axis: the sign of force or motion "
-            "is wrong, or a force that the model lacks (load, cogging) is taken for it."
+            "is wrong, a force that the model lacks (load, cogging) is taken for it, or friction "
+            "still falls at the fastest speed: then go faster, or give wider bounds."
         )
     return lines
 
