@@ -11,6 +11,7 @@ from jaxfric import cli, explain, models, predict, simulators, terms
 from jaxfric.explanation.mismatch import fewest
 from jaxfric.simulators import Known, Mujoco
 from jaxfric.terms import KNOWN_FORCE
+from jaxfric.terms.effects import EFFECTS
 from tests.test_explain import CASES, PARAMETERS, healthy, planted
 
 __all__ = ["healthy"]
@@ -52,6 +53,18 @@ def test_a_torque_constant_is_a_gain_and_nothing_else(healthy):
     assert set(finding.parameters) == {"gain"}
     assert float(finding.parameters["gain"].value) == pytest.approx(0.15, rel=0.02)
     assert "(the torque constant) is 1.1" in finding.sentence
+
+
+@pytest.mark.slow
+def test_a_dead_time_longer_than_the_kernel_keeps_its_size_beside_a_wrong_value(healthy):
+    """Its first order, refitted beside the values as given, would be another time."""
+    ahead = [EFFECTS["transport_delay"].undone(run, -0.03) for run in healthy]
+    ahead = [dataclasses.replace(run, force=1.15 * run.force) for run in ahead]
+    found = explain(ahead[0], simulator(), ahead[1])
+    by_name = {finding.effect: finding.parameters for finding in found.findings}
+    assert set(by_name) == {"parameter_mismatch", "transport_delay"}
+    assert float(by_name["transport_delay"]["delay"].value) == pytest.approx(0.03, rel=0.05)
+    assert float(by_name["parameter_mismatch"]["gain"].value) == pytest.approx(0.15, rel=0.02)
 
 
 @pytest.mark.slow

@@ -186,5 +186,13 @@ def at_given(model: Model, findings: Findings, free: tuple[int, ...]) -> Finding
         return Solution(problem, selection._replace(base=base, last=last, given=model, free=free))
 
     recorded = given(findings.recorded)
-    same = findings.undelayed is findings.recorded
-    return Findings(recorded, recorded if same else given(findings.undelayed))
+    if findings.undelayed is findings.recorded:
+        return Findings(recorded, recorded)
+    undelayed = given(findings.undelayed)
+    # A delay or a lag is known by undoing it: what its first order would be is another time.
+    known, others = recorded.selection.last, undelayed.selection.last
+    late = findings.selection.last.alphas[len(others.terms) :]
+    last = known._replace(betas=(*others.betas, *known.betas[len(others.terms) :]),
+                          alphas=(*others.alphas, *late))  # fmt: skip
+    selection = recorded.selection._replace(last=last)
+    return Findings(recorded._replace(selection=selection), undelayed)
