@@ -112,7 +112,11 @@ def _explain(
         for candidates in problem.candidate_sets:
             candidates.close()
         found = _explain(cut_off, simulate, seed, doing)
-        return sanity.with_limit(found, bound, inputs.figures)
+        found = sanity.with_limit(found, bound, inputs.figures)
+        there = found.fit["holdout_force_error"]
+        if there is None or not there["after"] > there["before"]:
+            return found
+        problem = problem_of(motion, known.structure)  # the other recording knows of no limit
     if held is not None:
         with_holdout(problem, held)  # says what is wrong with it before anything takes time
     if known.fit is not None:

@@ -4,6 +4,8 @@ import math
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
 from ..terms.effect import Effect, Extent
@@ -54,7 +56,8 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     Of another magnitude an interval down to zero says nothing, on a scale of ratios.
     """
     most = float(estimate.interval()[1])
-    if (name.startswith(effect.sizes) or name in effect.vanishes) and nil(estimate):
+    sized = name.startswith(effect.sizes) or name in effect.vanishes or effect.late
+    if sized and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
     if name in effect.magnitudes and nil(estimate):
         return UNSEEN
@@ -74,8 +77,32 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
         else:
             value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    text = f"Wrong values: {'; '.join(parts)}; {unexplained(share)}"
+    text = f"Wrong values: {'; '.join(parts)}{_alike(moved)}; {unexplained(share)}"
     return f"{text}{indistinct(rivals)}."
+
+
+# A common factor says something where its error is a quarter of its distance from one.
+KNOWN_FACTOR = 0.25
+
+
+def _alike(moved) -> str:
+    """Whether all values differ by one factor, as of a force that is counted otherwise."""
+    if len(moved) < 2 or not all(m.before for m in moved.values()):
+        return ""
+    factors = np.array([float(m.value) / m.before for m in moved.values()])
+    halves = np.array([float(m.estimate.half_width()) / abs(m.before) for m in moved.values()])
+    if not np.all((halves > 0) & np.isfinite(halves)):
+        return ""
+    weights = halves**-2 / np.sum(halves**-2)
+    factor, half = float(weights @ factors), float(np.sum(halves**-2) ** -0.5)
+    apart, unknown = np.abs(factors - factor) > halves, halves > abs(factor - 1)
+    if np.any(apart | unknown) or half > KNOWN_FACTOR * abs(factor - 1):
+        return ""
+    digits = max(0, 1 - math.floor(math.log10(half)))
+    return (
+        f"; all of them {factor:.{digits}f} ± {half:.{digits}f} times what they were, as where the "
+        "recorded force (the torque constant, a unit) is that many times the model's"
+    )
 
 
 def _times(factor: Estimate) -> str:

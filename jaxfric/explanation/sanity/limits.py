@@ -61,6 +61,9 @@ def limit_of(
     beyond = size > level
     if np.mean(beyond) > MOST:
         return None
+    # What moved the axis was no more than the limit at any time.
+    if np.sum(np.maximum(needed - level, 0) ** 2) > LEAVES * np.sum((size[beyond] - level) ** 2):
+        return None
     inside = np.sum((level - needed[beyond]) ** 2)
     if not inside < LEAVES * np.sum(mismatch[beyond]):
         return None

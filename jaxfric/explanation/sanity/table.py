@@ -8,6 +8,7 @@ import numpy as np
 from ...identification.uncertainty import Estimate
 from ...simulators import Mujoco
 from ...terms.effects.end_stop import END_STOP, place
+from ..acceptance import LINEARITY
 from ..quantities import quantity
 from . import limits
 from .contact import Contact
@@ -79,12 +80,12 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
         return []
     value, error = seen.values[name]
     times = Estimate(np.float64(1 + value), np.float64(error), "1")
-    chosen = name in seen.chosen
+    chosen, told = name in seen.chosen, seen.left <= LEAVES and abs(value) > LINEARITY
     size = quantity(times._replace(value=np.float64(abs(1 + value))))
-    if 1 + value < 0 and chosen:
+    if 1 + value + _half(error) < 0 and chosen and told:
         text = f"The force is counted the other way: it is {quantity(times)} times the simulator's."
         return [Check("force_sign", text, True, value=times, parameter="gain")]
-    if chosen and seen.left <= LEAVES:
+    if chosen and told:
         text = f"The torque constant is {size} times the simulator's."
         return [
             Check("force_sign", "The force has the simulator's sign."),
@@ -93,7 +94,7 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     text = f"The torque constant is the simulator's ({size} times it, by itself)."
     if not np.isfinite(error):
         text = "The motion cannot tell the torque constant."
-    elif chosen:
+    elif chosen and seen.left > LEAVES:
         text = "Wrong values leave most of the mismatch: of the torque constant they say nothing."
     return [
         Check("force_sign", "The force has the simulator's sign."),
