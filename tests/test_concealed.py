@@ -53,7 +53,13 @@ def expected_noise(machine):
 
 # A wrong parameter belongs to a model, not to a machine; machines whose mass or gain changes while
 # they run are not drawn yet: tests/test_moments.py plants those.
-NOT_DRAWN = {"parameter_mismatch", "payload_change", "gain_step", "parameter_step"}
+NOT_DRAWN = {
+    "parameter_mismatch",
+    "payload_change",
+    "gain_step",
+    "parameter_step",
+    "disturbance_force",
+}
 
 
 def test_every_effect_of_the_catalogue_can_be_concealed_but_those_that_are_named():

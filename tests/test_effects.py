@@ -76,6 +76,8 @@ CASES = {
     "friction_change": (T.FrictionRamp(T.Coulomb(), 6.3, 1.2), (1.5,)),
     "load_drift": (T.LoadDrift(0.0, 12.0, 3), (1.5, -1.0, 0.7)),
     "tone": (T.PeriodicDisturbance(3.7), (0.7, 0.9)),
+    "push": (T.DisturbanceForce(2.2, 3.1), (3.0,)),
+    "push_ramps": (T.DisturbanceForce(2.2, 3.1, 0.2), (3.0,)),
     "pulses": (T.DisturbancePulses((2.2, 7.1), 0.2), (3.0, -3.0)),
     "table_position": (T.Table("position", (-0.03, -0.01, 0.01, 0.03)), (1.0, -1.0, 2.0)),
     "table_directional": (
@@ -654,7 +656,7 @@ def test_the_catalogue_holds_together():
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance transport_delay actuator_lag actuator_deadband actuator_saturation "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
-        "periodic_disturbance disturbance_pulses cross_axis parameter_step"
+        "periodic_disturbance disturbance_force disturbance_pulses cross_axis parameter_step"
     )
     assert set(effects.EFFECTS) == set(reference_names.split())
     for effect in effects.EFFECTS.values():

@@ -17,6 +17,7 @@ from jaxfric.explanation import (
     candidates,
     contest,
     curves,
+    dates,
     doubts,
     evaluation,
     evidence,
@@ -1658,7 +1659,7 @@ def test_a_step_is_dated_between_two_rows(healthy):
     times = np.asarray(seen.motion.time)[seen.centre]
     widest = int(np.argmax(np.diff(times)))
     middle = Estimate(np.float64(times[widest : widest + 2].mean()), np.float64(1e-6), "s")
-    found = reported.dated({"step_time": middle}, "step_time", seen)["step_time"].standard_error
+    found = dates.dated({"step_time": middle}, "step_time", seen)["step_time"].standard_error
     assert found == pytest.approx((np.diff(times)[widest] + seen.reach) / np.sqrt(12))
 
 

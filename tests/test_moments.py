@@ -1,5 +1,7 @@
 """What changes at one moment, on machines of a few lines: an arm in rad, a slide in mm."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
@@ -61,6 +63,36 @@ def test_a_change_at_one_moment_is_named_with_it(change, effect, name, relative,
     truth = 0.2 if relative is None else relative * (0.8 if turning else 0.004)
     assert best.parameters[name].value == pytest.approx(truth, rel=0.1)
     assert "At t = " in best.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("begin", "seconds"), [(4.0, 2.5), (7.2, 0.8)])
+def test_a_force_that_acts_for_a_while_is_told_with_its_times(begin, seconds):
+    recording, simulator = ran("", True)
+    time = np.asarray(recording.time)
+    acts = (time > begin) & (time < begin + seconds)
+    recording = dataclasses.replace(recording, force=recording.force + 0.9 * acts)
+    (finding,) = jf.explain(recording, simulator).findings
+    assert finding.effect == "disturbance_force" and "From t = " in finding.sentence
+    truth = {"push_time": begin, "push_duration": seconds, "push_force": 0.9}
+    for name, value in truth.items():
+        low, high = finding.parameters[name].interval()
+        assert low < value < high and high - low < 0.5 * value
+
+
+@pytest.mark.slow
+def test_the_moment_of_a_change_is_anywhere_while_the_axis_rests():
+    """Between two moves a force may have begun at any time: the interval holds all of them."""
+    time = np.arange(0.0, 24.0, 2e-3)
+    speed = np.where(time % 4 < 2.5, 0.3 * np.sin(2 * np.pi * (time % 4) / 2.5), 0.0)
+    friction = 8 * np.sign(speed) + 5 * speed
+    force = 2 * np.gradient(speed, time) + friction + np.where(time > 11.8, 3.0, 0.0)
+    force += 0.05 * np.random.default_rng(2).normal(size=len(time))
+    recording = jf.Recording(time, force, velocity=speed)
+    (finding,) = jf.explain(recording, "coulomb-viscous").findings
+    low, high = finding.parameters["step_time"].interval()
+    assert low < 10.6 and 11.9 < high < 14
+    assert float(finding.parameters["step"].value) == pytest.approx(3.0, rel=0.02)
 
 
 @pytest.mark.slow

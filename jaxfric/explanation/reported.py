@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ..identification.uncertainty import Estimate
 from ..terms.effect import Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import verification
 from .baseline import Baseline
+from .dates import dated, spanning
 from .evidence import Evidence
 from .finding import Finding, Moved
 from .findings import Findings
@@ -40,6 +40,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         effect = selected.effect
         if effect.moment:
             parameters = dated(parameters, effect.moment, evidence)
+            parameters = spanning(parameters, findings, number)
         share, held = _shares(findings, first, number)
         alone.append(share)
         if twins := _twins(findings, number):
@@ -172,16 +173,3 @@ def _shares(findings: Findings, first: Fit, number: int) -> tuple[float, float |
     without, with_it = findings.holdout_residuals(less, number)
     power = np.sum(verification.residual(first, held) ** 2)
     return share, float((np.sum(without**2) - np.sum(with_it**2)) / power)
-
-
-def dated(parameters: dict[str, Estimate], moment: str, evidence: Evidence) -> dict[str, Estimate]:
-    """Parameters with the error of a time that may be anywhere between two rows, s.
-
-    Each row is blurred by the kernel; at rest rows are far apart.
-    """
-    own = parameters[moment]
-    times = np.asarray(evidence.motion.time)[evidence.centre]
-    after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
-    width = times[after] - times[after - 1] + evidence.reach
-    error = np.hypot(own.standard_error, width / np.sqrt(12))
-    return parameters | {moment: own._replace(standard_error=np.float64(error))}

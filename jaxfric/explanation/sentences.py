@@ -56,7 +56,8 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     Of another magnitude an interval down to zero says nothing, on a scale of ratios.
     """
     most = float(estimate.interval()[1])
-    sized = name.startswith(effect.sizes) or name in effect.vanishes or effect.late
+    sized = name.startswith(effect.sizes) or name in (*effect.vanishes, effect.lasting)
+    sized |= effect.late
     if sized and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
     if name in effect.magnitudes and nil(estimate):

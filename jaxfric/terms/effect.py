@@ -213,7 +213,8 @@ class Effect:
 
     - `sentence`: with parameters in braces; `variant`: another sentence where the name promises
       more than the values hold. `sizes`: parameters of which only the most is known where other
-      terms could stand in for all of it. `moment`: the parameter that dates it.
+      terms could stand in for all of it. `moment`: the parameter that dates it; `lasting`: that by
+      which it is over again.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -253,6 +254,7 @@ class Effect:
     variant: Callable[[Mapping[str, float], Extent], str | None] = _no_variant
     sizes: tuple[str, ...] = ("amplitude",)
     moment: str = ""
+    lasting: str = ""
     drawn: bool = True
 
     def __post_init__(self) -> None:
