@@ -92,7 +92,7 @@ def test_the_moment_of_a_change_is_anywhere_while_the_axis_rests():
     (finding,) = jf.explain(recording, "coulomb-viscous").findings
     low, high = finding.parameters["step_time"].interval()
     assert low < 10.6 and 11.9 < high < 14
-    assert float(finding.parameters["step"].value) == pytest.approx(3.0, rel=0.02)
+    assert float(finding.parameters["step_offset"].value) == pytest.approx(3.0, rel=0.02)
 
 
 @pytest.mark.slow

@@ -66,7 +66,7 @@ class DisturbanceForce(AbstractLaw):
 
 
 def whiles(term: DisturbanceForce, view: View) -> np.ndarray:
-    """Beginnings half a duration apart, for durations half an octave apart, down to a few flanks."""
+    """Beginnings half a duration apart, for durations half an octave apart."""
     low, high = (float(end) for end in inside_record(view.limits))
     shares = LONGEST * 2.0 ** -np.arange(0.0, 5.0, 0.5)
     pairs = [
