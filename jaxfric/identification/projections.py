@@ -50,6 +50,11 @@ class Rows(eqx.Module):
         """Whether the rows are the samples themselves, not passed through a kernel."""
         return self._filter is None
 
+    @property
+    def reach(self) -> int:
+        """Samples that a row reaches each way from its time."""
+        return 0 if self._filter is None else self._filter.reach
+
     def project(
         self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None = None
     ) -> Float[Array, "J p"]:
