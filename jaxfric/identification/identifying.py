@@ -65,6 +65,13 @@ def identify(
     than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so. A model that
     reads the position takes the integral of the velocity where none is recorded.
 
+    Inside `jax.jit` and its derivatives the numbers of the recording are not known, so that
+    nothing is chosen by them: the kernel reaches 24 samples each way, closed windows never give way
+    to the weak form, and a velocity that is not recorded is derived by another kernel. The result
+    is another one, by some per cent at times. For the same, prepare outside and give the width:
+    `log = signals.prepare(recording)`, `n = signals.kernel_half_width(log)`, and inside
+    `identify(model, log, projection=WeakForm(n))`.
+
     **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, for
     `align` inside `jax.jit`, and, with `throw`, for any other failure.
     """
