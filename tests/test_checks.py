@@ -285,6 +285,64 @@ def test_a_gain_of_its_own_for_each_sign_and_a_short_delay():
     assert abs(fit(fast, late, time)["force_late"] - 0.008) < 0.001
 
 
+def test_friction_that_differs_by_direction_is_no_gain():
+    """Beside a model that ties the directions; a gain that the inertia feels too stays one."""
+    t = np.arange(16000) / 1000
+    rates = 2 * np.pi * np.array([0.25, 0.7, 1.9])[:, None]
+    sizes = np.array([0.05, 0.01, 0.003])
+    x = sizes @ np.sin(rates * t)
+    v = (sizes * rates[:, 0]) @ np.cos(rates * t)
+    a = -(sizes * rates[:, 0] ** 2) @ np.sin(rates * t)
+    noise = 0.05 * np.random.default_rng(0).normal(size=t.size)
+
+    def said(force):
+        run = jf.Recording(t, force + noise, x, v)
+        found = jf.identify("symmetric-coulomb-viscous", run)
+        return {remark.name for remark in found.remarks}
+
+    differs = np.where(v > 0, 8 + 40 * v, -11 + 75 * v)
+    remarks = said(3 * a + differs)
+    assert "friction_by_direction" in remarks and "gain_by_sign" not in remarks
+    force = 12 * a + np.sign(v) * 8 + 40 * v
+    remarks = said(np.where(force > 0, 1.3 * force, force))
+    assert "gain_by_sign" in remarks and "friction_by_direction" not in remarks
+
+
+def test_spikes_are_no_overflow_however_many():
+    sound = log()
+    force = np.asarray(sound.force).copy()
+    at = np.random.default_rng(0).choice(np.arange(10, force.size - 10, 7), 25, replace=False)
+    force[at] += 400.0
+    (remark,) = checks.inspect(changed(sound, force=force))
+    assert remark.name == "force_spikes" and remark.text.startswith("25 lone samples")
+    # Both ways, of three samples each.
+    for k, i in enumerate(at):
+        force[i : i + 3] = 400.0 * (-1) ** k
+    assert "force_wraps" not in names(changed(sound, force=force))
+
+
+def test_a_coefficient_of_either_sign_is_not_called_negative():
+    assert [
+        n for n in ("inertia", "coulomb+", "viscous_2-", "coulomb_2") if not checks.passive(n)
+    ] == []
+    others = ("inertia_cos", "inertia_sin", "coulomb_asymmetry", "step_coulomb", "payload_inertia")
+    assert not any(map(checks.passive, others))
+    rng, sound = np.random.default_rng(0), log()
+    x, v = np.asarray(sound.position), np.asarray(sound.velocity)
+    varying = jf.terms.PositionDependentInertia(0.06)
+    a = np.gradient(v, np.asarray(sound.time))
+    own = np.asarray(varying.columns(sound)) @ [0.4, -0.8]
+    momentum = np.asarray(varying.momentum(sound)) @ [0.4, -0.8]
+    own = own + np.gradient(momentum, np.asarray(sound.time))
+    force = 3 * a + 8 * np.sign(v) + 40 * v + own + 0.05 * rng.normal(size=v.size)
+    found = jf.identify(
+        jf.models.coulomb_viscous() + varying, changed(sound, force=force, position=x)
+    )
+    assert float(found.parameters["inertia_cos"].interval()[1]) < 0
+    assert "negative_parameter" not in {r.name for r in found.remarks}
+    assert "as in no passive axis" not in str(found)
+
+
 def test_a_set_point_is_no_position():
     sound = log()
     twin = changed(sound, channels={"reference": sound.position})

@@ -257,10 +257,8 @@ def test_a_pitch_that_only_noise_suggests_has_rivals():
         assert f"The other one: pitch = {rival:.6g} m." in found.diagnosis
 
 
-# Beside coulomb-viscous. Left out: what names no nonlinear parameter (nothing is searched for), and
-# a step of no length at all, whose date has no derivative and so no interval.
-SEARCHED = {n: case for n, case in CASES.items() if case[0].nonlinear and n != "friction_step"}
-SEARCHED["friction_step"] = (T.FrictionStep(T.Coulomb(), 6.3, ramp=0.06), (1.5,))
+# Beside coulomb-viscous. Left out: what names no nonlinear parameter (nothing is searched for).
+SEARCHED = {n: case for n, case in CASES.items() if case[0].nonlinear}
 
 
 def found_again(name, base, noise=0.5, seed=1):

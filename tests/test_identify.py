@@ -585,3 +585,41 @@ def test_friction_that_still_falls_at_the_fastest_speed_singles_no_bump_out():
     assert wide.result == jf.Result.ambiguous
     assert "negative_parameter" in [each.name for each in wide.remarks]
     assert "still falls" in str(wide)
+
+
+@pytest.mark.parametrize("width", [0.02, 0, True, None, "16"])
+def test_a_half_width_counts_samples(width):
+    with pytest.raises(
+        ValueError, match="half_width is .*, and counts samples: give a whole number"
+    ):
+        jf.WeakForm(width)
+    assert jf.WeakForm(np.int64(16)) == jf.WeakForm(16)
+
+
+def test_a_term_of_the_others_force_is_refused_by_its_name():
+    terms = jf.terms
+    model = jf.models.coulomb_viscous() + terms.ForceRipple() + terms.ActuatorLag()
+    with pytest.raises(
+        ValueError, match="^ForceRipple and ActuatorLag act on the force that the"
+    ) as e:
+        jf.identify(model, recording(machine()))
+    assert "jaxfric.explain(recording, fit) finds them" in str(e.value)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_given_width_gives_inside_jit_what_a_call_gives(recorded):
+    log = recording(machine(), noise=0.3)
+    log = log if recorded else dataclasses.replace(log, velocity=None)
+    ready = jf.signals.prepare(log)
+    model = jf.models.named("symmetric-coulomb-viscous") + jf.terms.Spring()
+    width = jf.signals.kernel_half_width(ready)
+
+    def fit(log, projection=None):
+        return jnp.stack(
+            list(jf.identify(model, log, projection=projection).model.parameters.values())
+        )
+
+    called = fit(ready, jf.WeakForm(width))
+    traced = jax.jit(lambda log: fit(log, jf.WeakForm(width)))(ready)
+    np.testing.assert_allclose(traced, called, rtol=1e-10)
+    np.testing.assert_allclose(called, fit(log), rtol=1e-10)

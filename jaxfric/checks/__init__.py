@@ -13,6 +13,7 @@ from .kinds import (
     NAMES as NAMES,
     Remark as Remark,
     none as none,
+    passive as passive,
     places as places,
     remarks as remarks,
 )

@@ -19,6 +19,8 @@ class Design(NamedTuple):
     - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
     - `shift`: by how much each parameter moves for a second by which the force is taken too late,
       `(P,)`, of the fit itself, which closed windows make of other rows than these.
+    - `forward`: the columns of friction where the axis moves forward, zero elsewhere, `(J, k)`;
+      `None` where the direction of the rows is not known.
     """
 
     columns: Float[Array, "J P"]
@@ -27,3 +29,4 @@ class Design(NamedTuple):
     weight: Float[Array, " J"]
     time: Float[Array, " J"]
     shift: Float[Array, " P"]
+    forward: Float[Array, "J k"] | None = None

@@ -80,7 +80,7 @@ def fitted(design: Design, force_error: float, fit: Estimated | None = None) -> 
     if known is not None and fit is not None and _beyond(known, fit, np.asarray(design.shift)):
         least = 0.0, HALF * (energy - _rough(left) ** 2)
     found = _slightly_late(known, design, *least)
-    found |= found or _gain(basis, target, left)
+    found |= found or _gain(basis, target, left, design.forward, rows)
     if not found and energy > least[0]:
         found |= _late(design, rows, basis, energy, max(least))
     if not found and energy > MATTERS**2 * power:
@@ -102,10 +102,13 @@ PART = 0.2
 # Of a force with less of its power in one sign, a tenth of its size, a gain of that sign would be
 # read off next to nothing.
 ONE_SIGN = 0.01
+# What leaves less than half as much again does as well.
+ALIKE = 1.5
 
 
-def _gain(basis, target, left) -> dict[str, float]:
-    """The gain of the positive force, where one of its own leaves half of the residual.
+def _gain(basis, target, left, forward, rows) -> dict[str, float]:
+    """The gain of the positive force, where one of its own leaves half of the residual; or which
+    share friction of each direction leaves, where that does as well: a machine has it more often.
 
     Of the force that the model gives: the measured one holds its own noise, which where each
     direction has parameters of its own is all that they leave of it.
@@ -119,9 +122,15 @@ def _gain(basis, target, left) -> dict[str, float]:
     if size <= 1e-6 * powers[0]:
         return {}
     share = float(own @ left) / size
-    if share**2 * size > HALF * float(left @ left) and MATTERS < abs(share) < 1:
-        return {"gain_by_sign": 1 / (1 - share)}
-    return {}
+    energy = float(left @ left)
+    rest = energy - share**2 * size
+    if rest >= HALF * energy or not MATTERS < abs(share) < 1:
+        return {}
+    if forward is not None and forward.shape[1]:
+        apart = _least(np.concatenate([basis, np.asarray(forward, float)[rows]], axis=1), left)
+        if apart <= ALIKE * rest:
+            return {"friction_by_direction": (apart / energy) ** 0.5}
+    return {"gain_by_sign": 1 / (1 - share)}
 
 
 def _rough(left: np.ndarray) -> float:

@@ -1,5 +1,7 @@
 """Faults that a recorded force shows by itself, on the host."""
 
+import itertools
+
 import numpy as np
 
 from ..data.recording import Recording
@@ -58,10 +60,30 @@ def force_faults(
         step & clock.linked & fast[1:] & fast[:-1] & (np.sign(velocity[1:] * velocity[:-1]) > 0)
     )
     if np.count_nonzero(across) > LONE:
-        found["force_wraps"] = int(np.count_nonzero(across))
+        spikes = _spikes(whole, step & clock.linked, valid)
+        name, count = ("force_spikes", spikes) if spikes.any() else ("force_wraps", across)
+        found[name] = int(np.count_nonzero(count))
     found |= _held(force) or _interpolated(force)
     found |= _filler(force, speed[valid])
     return found | ({} if "force_clipped" in found else _frozen(force, velocity[valid]))
+
+
+def _spikes(force: np.ndarray, step: np.ndarray, valid: np.ndarray) -> np.ndarray:
+    """Samples between a jump and the jump back, three at most, where these alone make the range.
+
+    A number that overflows goes on from the other end of its range, and uses all of it.
+
+    **Arguments:** `step`, whether the force jumps from each sample to the next, `(N - 1,)`.
+    """
+    jumps, change = np.flatnonzero(step).tolist(), np.diff(force)
+    spikes = np.zeros(len(force), bool)
+    back = -1  # what lies between two spikes is none
+    for first, last in itertools.pairwise(jumps):
+        if first != back and last - first <= LONE and change[first] * change[last] < 0:
+            spikes[first + 1 : last + 1], back = True, last
+    rest = force[valid & ~spikes]
+    alone = spikes.any() and np.ptp(rest) < 0.5 * np.ptp(force[valid])
+    return spikes if alone else np.zeros_like(spikes)
 
 
 def _frozen(force: np.ndarray, velocity: np.ndarray) -> dict[str, float]:

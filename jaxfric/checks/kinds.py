@@ -1,5 +1,6 @@
 """The faults that are looked for: names, severity, and the sentence with the remedy."""
 
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -157,8 +158,8 @@ KINDS = (
     Kind(
         "force_wraps",
         False,
-        "At {value:.0f} samples the force jumps across its whole range in full motion: its numbers "
-        "overflow. Log it with more bits.",
+        "At {value:.0f} samples the force jumps across its whole range in full motion and goes on "
+        "from the other end: its numbers overflow. Log it with more bits.",
     ),
     Kind(
         "force_levels",
@@ -176,7 +177,7 @@ KINDS = (
     Kind(
         "force_spikes",
         False,
-        "{value:.0f} samples hold a force ten times beyond all others: made by the sensor or the "
+        "{value:.0f} lone samples hold a force far beyond all others: made by the sensor or the "
         "file. Empty these cells, which masks them.",
     ),
     Kind(
@@ -255,6 +256,13 @@ KINDS = (
         "the error: the sensor or amplifier has a gain of its own for each sign.",
     ),
     Kind(
+        "friction_by_direction",
+        False,
+        "Friction differs by direction: with friction of its own for each the error would be "
+        "{value:.0%} of what it is. Give --model without symmetric-, in Python "
+        "Directional(Coulomb() + Viscous()).",
+    ),
+    Kind(
         "change_in_the_middle",
         False,
         "Before and after {value:.4g} s the recording obeys different parameters: another machine "
@@ -287,6 +295,17 @@ KINDS = (
     ),
 )
 NAMES = tuple(kind.name for kind in KINDS)
+
+
+# Of these no passive axis has less than zero: not their share by direction or by a wave over the
+# position (`coulomb_asymmetry`, `inertia_cos`), which has either sign.
+_PASSIVE = re.compile(r"(inertia|coulomb|viscous)(_\d+)?[+-]?")
+
+
+def passive(name: str) -> str:
+    """Which of inertia, Coulomb and viscous friction a parameter is; empty for another one."""
+    match = _PASSIVE.fullmatch(name)
+    return match[1] if match else ""
 
 
 def none() -> np.ndarray:

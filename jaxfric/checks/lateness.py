@@ -84,7 +84,8 @@ def _looks(designs: Design) -> list[Look]:
     index = np.flatnonzero(good)
     if not len(index):
         return found
-    columns, used, designs = columns[index], used[index], Design(*(x[index] for x in designs))
+    columns, used = columns[index], used[index]
+    designs = jax.tree.map(lambda x: x[index], designs)
     slope = np.where(used, _slopes(designs, last[index]), 0.0)
     target, left = (np.where(used, x, 0.0) for x in (designs.target, designs.left))
     positive = np.maximum(target - left, 0.0)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ..identification.moments import between
 from ..identification.uncertainty import Estimate
 from ..terms.effects import traits
 from .baseline import refitted
@@ -15,15 +16,12 @@ FIRST, FURTHER = 0.5, 1.5
 
 
 def dated(parameters: dict[str, Estimate], moment: str, evidence: Evidence) -> dict[str, Estimate]:
-    """Parameters with the error of a time that may be anywhere between two rows, s.
-
-    Each row is blurred by the kernel; at rest rows are far apart.
-    """
+    """Parameters with the error of a time that may be anywhere between two rows, s."""
     own = parameters[moment]
     times = np.asarray(evidence.motion.time)[evidence.centre]
     after = int(np.clip(np.searchsorted(times, own.value), 1, len(times) - 1))
-    width = times[after] - times[after - 1] + evidence.reach
-    error = np.hypot(own.standard_error, width / np.sqrt(12))
+    anywhere = between(times[after - 1], times[after], evidence.reach)
+    error = np.hypot(own.standard_error, anywhere)
     return parameters | {moment: own._replace(standard_error=np.float64(error))}
 
 

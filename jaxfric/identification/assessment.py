@@ -167,7 +167,7 @@ def solved(
             columns = weak.columns(known, recording)
             left = weak.target - weak.offset(known, recording) - columns @ alpha
         spread = uncertainty.deviations(jacobian, error, weight, place)
-        design = _design(columns, left, weak, shift)
+        design = _design(known, columns, left, weak, shift)
         return Solved(alpha, spread, design, jnp.zeros_like(alpha))
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
@@ -191,7 +191,7 @@ def solved(
     return Solved(
         jnp.insert(alpha, index[0], weighed.mass),
         spread,
-        _design(_inserted(weighed.columns, index[0]), weighed.left, weak, shift),
+        _design(term, _inserted(weighed.columns, index[0]), weighed.left, weak, shift),
         jnp.insert(pull, index[0], 0.0),
     )
 
@@ -208,8 +208,11 @@ def _inserted(columns: Float[Array, "J p"], index: int) -> Float[Array, "J p"]:
     return jnp.concatenate([others[:, :index], columns[:, :1], others[:, index:]], axis=1)
 
 
-def _design(columns, left, weak: Rows, shift) -> Design:
-    return Design(columns, weak.target, left, weak.positive + weak.negative, weak.time, shift)
+def _design(term, columns, left, weak: Rows, shift) -> Design:
+    weight = weak.positive + weak.negative
+    friction = columns[:, np.flatnonzero(_by_velocity(term))]
+    forward = jnp.where((weak.positive > 0)[:, None], friction, 0.0)
+    return Design(columns, weak.target, left, weight, weak.time, shift, forward)
 
 
 def unseen(term, active, jacobian, weight) -> Bool[Array, " P"]:

@@ -63,7 +63,7 @@ def checked(
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     delayed = found.model.force_delay is not None
-    passive = [i for i, n in enumerate(names) if n.startswith(("inertia", "coulomb", "viscous"))]
+    passive = [i for i, n in enumerate(names) if checks.passive(n)]
     intervals = signals.host_intervals(logs)
     looks = checks.looks(designs)
     fits = [
@@ -120,7 +120,7 @@ def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passi
     Of a load beyond the dry friction one direction has the friction less the load.
     """
     loaded = constant_load.load(names, alpha, half) is not None
-    counted = [k for k in passive if not (loaded and names[k].startswith("coulomb"))]
+    counted = [k for k in passive if not (loaded and checks.passive(names[k]) == "coulomb")]
     return int(np.sum((alpha + half)[counted] < 0))
 
 

@@ -18,7 +18,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
 from ..terms.inertia import Inertia
 from ..terms.sample import Scales
-from . import alignment, assessment, grouping
+from . import alignment, assessment, grouping, moments
 from .checking import checked, looked_at
 from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
 from .narrowing import narrowed, reaching
@@ -67,6 +67,13 @@ def identify(
     and `remarks` of the result, and signals that contradict each other are its `result`. Of more
     than 262,144 samples sixteen pieces, evenly spread, are used, and a remark says so. A model that
     reads the position takes the integral of the velocity where none is recorded.
+
+    Inside `jax.jit` and its derivatives the numbers of the recording are not known, so that
+    nothing is chosen by them: the kernel reaches 24 samples each way, closed windows never give way
+    to the weak form, and a velocity that is not recorded is derived by another kernel. The result
+    is another one, by some per cent at times. For the same, prepare outside and give the width:
+    `log = signals.prepare(recording)`, `n = signals.kernel_half_width(log)`, and inside
+    `identify(model, log, projection=WeakForm(n))`.
 
     **Raises:** `ValueError` for closed windows with terms that depend on more than velocity, for
     `align` inside `jax.jit`, and, with `throw`, for any other failure.
@@ -233,7 +240,7 @@ def _search_rows(magnitudes, term, recording, projection, width, given, grid) ->
     recording = sanitised(recording)
     limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
     rows = projection.rows(recording, limits)
-    active, inertial = term if projection.keeps_inertia else _without_inertia(term), None
+    active, inertial = _active(term, projection, limits), None
     if active.nonlinear and not projection.keeps_inertia:
         inertial = assessment.inertial_force(recording, limits, rows)
         rows = eqx.tree_at(lambda r: r.target, rows, rows.target - inertial.force)
@@ -256,10 +263,11 @@ def _assess(
     finite = all_finite(recording)
     recording = sanitised(recording)
     weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
-    active = term if projection.keeps_inertia else _without_inertia(term)
+    active = _active(term, projection, limits)
     alpha, jacobian, error = assessment.solve(active, beta, recording, rows, alpha)
     weight = rows.positive + rows.negative
     minimum = jnp.sum(weight * (error if inertial is None else error + inertial.force) ** 2)
+    fitted, residual = alpha, error
     alpha, spread, design, pull = assessment.solved(
         active.with_beta(beta),
         alpha,
@@ -272,7 +280,9 @@ def _assess(
         weak,
         inertial,
     )
-    matrix = spread.covariance
+    beta, matrix = moments.dated(
+        active, fitted, beta, recording, rows, limits.interval, residual, spread.covariance
+    )
     nothing = ~finite | (jnp.sum(weight) <= 0)
     alpha = jnp.where(nothing, jnp.nan, alpha)
     matrix = jnp.where(nothing, jnp.inf, matrix)
@@ -344,6 +354,12 @@ def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, "
     top = jnp.max(jnp.where(used, jnp.abs(velocity)[None, :], 0.0), axis=1)
     both = jnp.min(jnp.where(top > limits.slowest, top, jnp.inf))
     return jnp.maximum(jnp.minimum(limits.fastest, both), 4 * limits.slowest)
+
+
+def _active(term: AbstractTerm, projection, limits: Scales) -> AbstractTerm:
+    """The terms that are fitted, with moments that have a derivative."""
+    own = term if projection.keeps_inertia else _without_inertia(term)
+    return own.resolved(moments.RAMP * limits.interval)
 
 
 def _without_inertia(term: AbstractTerm) -> AbstractTerm:

@@ -11,6 +11,7 @@ from abc import abstractmethod
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..checks.motion import RARE
@@ -51,6 +52,11 @@ class Rows(eqx.Module):
     def sampled(self) -> bool:
         """Whether the rows are the samples themselves, not passed through a kernel."""
         return self._filter is None
+
+    @property
+    def reach(self) -> int:
+        """Samples that a row reaches each way from its time."""
+        return 0 if self._filter is None else self._filter.reach
 
     def project(
         self, columns: Float[Array, "N p"], momentum: Float[Array, "N p"] | None = None
@@ -316,13 +322,26 @@ def make_filter(recording: Recording, typical: Float[Array, ""], half_width: int
 class WeakForm(AbstractProjection):
     """Everything through one kernel (1 − τ²)⁴, slid along the record by half its half-width.
 
-    **Arguments:** `half_width`, in samples; by default
-    [`kernel_half_width`][jaxfric.signals.kernel_half_width] of the recording.
+    **Arguments:** `half_width`, in samples; [`identify`][jaxfric.identify] takes
+    [`kernel_half_width`][jaxfric.signals.kernel_half_width] of the recording by default.
     Kernels not wholly inside slip of one direction are left out, since there friction jumps.
+
+    **Raises:** `ValueError` for a half-width that is no whole number from 1.
     """
 
-    half_width: int = eqx.field(static=True)
+    half_width: int = eqx.field(
+        static=True, converter=lambda w: int(w) if isinstance(w, np.integer) else w
+    )
     keeps_inertia = True
+
+    def __check_init__(self):
+        width = self.half_width
+        if not isinstance(width, int) or isinstance(width, bool) or width < 1:
+            raise ValueError(
+                f"half_width is {width!r}, and counts samples: give a whole number from 1, of "
+                "seconds their number times the sample rate, as WeakForm(round(0.02 * rate)); or "
+                "leave the projection out, and the width is chosen from the recording."
+            )
 
     def rows(self, recording: Recording, scales: Scales) -> Rows:
         """The rows of a prepared recording; weighted where the kernel lies wholly inside slip."""

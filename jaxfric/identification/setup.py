@@ -13,8 +13,8 @@ from jaxtyping import Array, Bool
 from .. import signals
 from ..data.recording import Recording, described, row_of
 from ..models import Model, named
-from ..terms.actuator import PREDICTED, REACTION
-from ..terms.base import AbstractTerm
+from ..terms.actuator import PREDICTED, REACTION, predicted
+from ..terms.base import AbstractTerm, leaves
 from . import blocks, grids
 from .identified import Identified
 from .projections import AbstractProjection, ClosedWindows, WeakForm
@@ -143,17 +143,25 @@ def _check(term, projection, recording):
     missing = {"position"} & beyond if recording.position is None else set()
     missing |= {c for c in beyond if c not in ("position", "time") and c not in recording.channels}
     if missing & {PREDICTED, REACTION}:
-        raise ValueError(
-            "The model holds a term of the force that the motion needs, as faults of an actuator "
-            "are and friction by its load, and the recording does not hold that. Identify the "
-            "rest; jaxfric.explain finds such terms beside it."
-        )
+        raise ValueError(_acts_on_force(term))
     if missing:
         place = [] if recording.position is None else ["position"]
         raise ValueError(
             f"The model needs {', '.join(sorted(missing))}, which the recording lacks; "
             f"it has {', '.join(['time', *place, 'velocity', *recording.channels])}."
         )
+
+
+def _acts_on_force(term: AbstractTerm) -> str:
+    """Which terms of a model need the force of its other terms, and what to do."""
+    names = dict.fromkeys(type(part).__name__ for part in leaves(term) if predicted(part))
+    verb, them = ("acts", "it") if len(names) == 1 else ("act", "them")
+    return (
+        f"{' and '.join(names)} {verb} on the force that the other terms make, as an actuator's "
+        "faults and friction that grows with the load do. identify cannot fit both at once. Leave "
+        f"{them} out and identify the other terms, fit = jaxfric.identify(others, recording); then "
+        f"jaxfric.explain(recording, fit) finds {them} beside these."
+    )
 
 
 def _prepare(recording: Recording) -> Recording:

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..checks.kinds import passive
 from ..data import summary
 from ..data.printable import printable
 from ..looks.text import Block, Table, aligned, text, wrapped
@@ -213,8 +214,8 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
     falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
     faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half]
     loaded = any(warning["name"] == LOAD for warning in said)
-    passive = ("viscous", "inertia") if loaded else ("coulomb", "viscous", "inertia")
-    wrong = [n for n, (value, half) in sizes.items() if n.startswith(passive) and value < -half]
+    counted = {"viscous", "inertia"} if loaded else {"coulomb", "viscous", "inertia"}
+    wrong = [n for n, (value, half) in sizes.items() if passive(n) in counted and value < -half]
     lines = []
     if falling:
         lines.append(

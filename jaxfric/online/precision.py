@@ -99,8 +99,8 @@ def _negative(found: dict[str, Estimate], model: Model) -> int:
     values = np.array([float(found[n].value) for n in names])
     half = np.array([float(found[n].half_width()) for n in names])
     loaded = constant_load.load(names, values, half) is not None
-    stems = ("viscous",) if loaded else ("viscous", "coulomb")
-    counted = np.array([n.startswith(stems) for n in names], bool)
+    stems = {"viscous"} if loaded else {"viscous", "coulomb"}
+    counted = np.array([checks.passive(n) in stems for n in names], bool)
     return int(np.sum((values + half)[counted] < 0))
 
 

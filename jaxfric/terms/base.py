@@ -130,6 +130,13 @@ class AbstractTerm(eqx.Module):
         names = [parameter.name for parameter in self.nonlinear]
         return eqx.tree_at(lambda term: [getattr(term, name) for name in names], self, list(beta))
 
+    def resolved(self, length: Float[Array, ""]) -> "AbstractTerm":
+        """The same term with a jump in time drawn out over `length`, s.
+
+        A jump between two samples has no derivative by its moment; a short ramp has.
+        """
+        return self
+
     def __add__(self, other: "AbstractTerm") -> "Sum":
         return Sum(summands(self) + summands(other))
 
@@ -207,6 +214,9 @@ class Sum(AbstractTerm):
             tuple(t.with_beta(b) for t, b in zip(self.terms, split(beta, counts), strict=True))
         )
 
+    def resolved(self, length: Float[Array, ""]) -> "Sum":
+        return Sum(tuple(term.resolved(length) for term in self.terms))
+
 
 class Directional(AbstractTerm):
     """A term with parameters of its own for each direction of motion.
@@ -261,6 +271,9 @@ class Directional(AbstractTerm):
             beta, [len(self.positive.nonlinear), len(self.negative.nonlinear)]
         )
         return Directional(self.positive.with_beta(positive), self.negative.with_beta(negative))
+
+    def resolved(self, length: Float[Array, ""]) -> "Directional":
+        return Directional(self.positive.resolved(length), self.negative.resolved(length))
 
     def _sides(self, recording, positive, negative):
         v = recording.velocity[:, None]

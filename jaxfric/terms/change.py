@@ -1,5 +1,6 @@
 """What changes at one moment: the date, the step over time, and terms that begin."""
 
+import copy
 from abc import abstractmethod
 
 import equinox as eqx
@@ -24,7 +25,9 @@ def inside_record(scales):
 # Two dates of a step differ by what lies between them only: the cost is no parabola but a wedge,
 # and a date is refined inside_record a step of the grid.
 _MOMENTS = Resolution(1, 256, None, 256)
-STEP_TIME = Parameter("step_time", TIME, inside_record, logarithmic=False, resolution=_MOMENTS)
+STEP_TIME = Parameter(
+    "step_time", TIME, inside_record, logarithmic=False, resolution=_MOMENTS, moment=True
+)
 
 
 def around(moment: float, ramp: float) -> dict[str, tuple[float, float]]:
@@ -62,6 +65,47 @@ def stepped_text(s: Syntax, moment: str, ramp: str | float) -> str:
         return s.choose(f"t > {moment}", "1.0", "0.0")
     ramp = ramp if isinstance(ramp, str) else literal(ramp)
     return s.clip(f"(t - {moment}) / {ramp} + 0.5", "0.0", "1.0")
+
+
+class Resolved(AbstractTerm):
+    """A step, `term`, drawn out to a ramp of `length` seconds, a number of the recording."""
+
+    term: AbstractTerm
+    length: Float[Array, ""]
+
+    @property
+    def affine(self):
+        return self.term.affine
+
+    @property
+    def nonlinear(self):
+        return self.term.nonlinear
+
+    @property
+    def coordinates(self):
+        return self.term.coordinates
+
+    @property
+    def inertial(self) -> bool:
+        return self.term.inertial
+
+    def columns(self, recording: Recording) -> Float[Array, "N p"]:
+        return self._ramped().columns(recording)
+
+    def momentum(self, recording: Recording) -> Float[Array, "N p"]:
+        return self._ramped().momentum(recording)
+
+    def beta(self) -> Float[Array, " d"]:
+        return self.term.beta()
+
+    def with_beta(self, beta: Float[Array, " d"]) -> "Resolved":
+        return Resolved(self.term.with_beta(beta), self.length)
+
+    def _ramped(self):
+        # `ramp` is static: the copy, with a traced one, must not leave this object.
+        ramped = copy.copy(self.term)
+        object.__setattr__(ramped, "ramp", self.length)
+        return ramped
 
 
 class AbstractChange(AbstractTerm):
@@ -120,6 +164,9 @@ class AbstractChange(AbstractTerm):
     @property
     def switched(self) -> AbstractTerm:
         return self.changed
+
+    def resolved(self, length):
+        return self if self.ramp else Resolved(self, length)
 
     def course(self, betas, time):
         return course(self.ramp, betas, time)

@@ -105,7 +105,8 @@ class Parameter(NamedTuple):
     (2004), assumption (A.3); `logarithmic` says whether its natural scale is a ratio. `resolution`
     says how near to each other two minima of the cost can be; `None` for a cost that is smooth over
     octaves, or over a fraction of the range where the scale is no ratio. `repeats`: whether it is
-    the period of a wave over position or time, or its frequency.
+    the period of a wave over position or time, or its frequency. `moment`: whether it is the time
+    of a change, which a few rows about it tell.
     """
 
     name: str
@@ -114,6 +115,7 @@ class Parameter(NamedTuple):
     logarithmic: bool = True
     resolution: Resolution | None = None
     repeats: bool = False
+    moment: bool = False
 
     def period(self, value: float) -> float | None:
         """The period of the wave whose period or frequency it is; `None` for another parameter."""

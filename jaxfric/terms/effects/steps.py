@@ -11,7 +11,16 @@ from jaxtyping import Array, Float
 from ...units import DIMENSIONLESS, TIME
 from ..actuator import PREDICTED
 from ..base import AbstractLaw, AbstractTerm, Sum, summands
-from ..change import STEP_TIME, AbstractChange, around, course, inside_record, stepped, stepped_text
+from ..change import (
+    STEP_TIME,
+    AbstractChange,
+    Resolved,
+    around,
+    course,
+    inside_record,
+    stepped,
+    stepped_text,
+)
 from ..effect import GRID, Effect, Extent, View, even, with_parameter
 from ..friction import Coulomb
 from ..inertia import Inertia, Offset
@@ -44,6 +53,9 @@ class FrictionStep(AbstractModulated):
     @property
     def switched(self):
         return None if self.term.nonlinear else self.term
+
+    def resolved(self, length):
+        return self if self.ramp else Resolved(self, length)
 
     def course(self, betas, time):
         return course(self.ramp, betas, time)
