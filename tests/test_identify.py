@@ -223,7 +223,7 @@ def test_vmap_and_jit_agree_with_a_plain_call():
 @pytest.mark.parametrize(
     "term, told",
     [
-        (jf.terms.GainAsymmetry(), "Identify the rest; jaxfric.explain finds such terms"),
+        (jf.terms.GainAsymmetry(), "Leave it out and identify the other terms"),
         (jf.terms.LoadDependentFriction("load"), "needs load, which the recording lacks; it has"),
     ],
 )

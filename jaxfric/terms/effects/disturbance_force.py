@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, TIME
 from ..base import AbstractLaw
-from ..change import STEP_TIME, course, inside_record, stepped, stepped_text
+from ..change import STEP_TIME, Resolved, course, inside_record, stepped, stepped_text
 from ..effect import Effect, View
 from ..inertia import Offset
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
@@ -59,6 +59,9 @@ class DisturbanceForce(AbstractLaw):
         flanks = (course(self.ramp, moments, time) for moments in (betas, betas.sum(1)[:, None]))
         (begun, rise), (over, fall) = flanks
         return begun - over, rise - fall
+
+    def resolved(self, length):
+        return self if self.ramp else Resolved(self, length)
 
     def extent(self, values):
         begin, half = values["push_time"], self.ramp or 1.0
