@@ -51,21 +51,25 @@ def dated(
     **Arguments:** `term`, the fitted terms, with their `alpha` and `beta`; `interval` between the
     samples, s; `error`, the residual.
     """
-    for number in (i for i, p in enumerate(term.nonlinear) if p.moment):
-        moment, variance = _dated(term, alpha, beta, number, recording, rows, interval, error)
+    for number, parameter in enumerate(term.nonlinear):
+        if not (parameter.moment or parameter.lasting):
+            continue
+        begin = beta[number - 1] if parameter.lasting else jnp.zeros_like(beta[number])
+        known = term, alpha, beta, number, begin
+        moment, variance = _dated(*known, recording, rows, interval, error)
         at = matrix.shape[0] - beta.size + number
         beta, matrix = beta.at[number].set(moment), matrix.at[at, at].set(variance)
     return beta, matrix
 
 
-def _dated(term, alpha, beta, number, recording, rows, interval, error):
-    """One moment, and its variance, s²."""
+def _dated(term, alpha, beta, number, begin, recording, rows, interval, error):
+    """One moment, s after `begin`, and its variance, s²."""
     weight = rows.positive + rows.negative
 
     def force(moment):
         return rows.force(term.with_beta(beta.at[number].set(moment)), alpha, recording)
 
-    before, after = _around(rows.time, weight > 0, beta[number])
+    before, after = _around(rows.time - begin, weight > 0, beta[number])
     inside = jnp.isfinite(before) & jnp.isfinite(after)
     unmoved = jnp.sum(weight * jax.jacfwd(force)(beta[number]) ** 2) == 0
     moment = jnp.where(inside & unmoved, 0.5 * (before + after), beta[number])
@@ -82,7 +86,7 @@ def _dated(term, alpha, beta, number, recording, rows, interval, error):
     own = uncertainty.reach(jnp.minimum(first, interval * recording.num_samples))
     blurred = jnp.where(inside, between(before, after, rows.reach * interval), 0.0)
     # Of a change of nothing there is no moment.
-    told = jnp.any(weight * (there - force(rows.time[-1])) ** 2 > 0)
+    told = jnp.any(weight * (there - force(rows.time[-1] - begin)) ** 2 > 0)
     return moment, jnp.where(told, jnp.maximum(own, blurred) ** 2, jnp.inf)
 
 

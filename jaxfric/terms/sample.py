@@ -106,7 +106,8 @@ class Parameter(NamedTuple):
     says how near to each other two minima of the cost can be; `None` for a cost that is smooth over
     octaves, or over a fraction of the range where the scale is no ratio. `repeats`: whether it is
     the period of a wave over position or time, or its frequency. `moment`: whether it is the time
-    of a change, which a few rows about it tell.
+    of a change, which a few rows about it tell; `lasting`: or how long after the one before it that
+    is over again.
     """
 
     name: str
@@ -116,6 +117,7 @@ class Parameter(NamedTuple):
     resolution: Resolution | None = None
     repeats: bool = False
     moment: bool = False
+    lasting: bool = False
 
     def period(self, value: float) -> float | None:
         """The period of the wave whose period or frequency it is; `None` for another parameter."""

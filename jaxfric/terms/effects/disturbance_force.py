@@ -24,7 +24,9 @@ def _durations(scales):
 
 
 PUSH_TIME = STEP_TIME._replace(name="push_time")
-PUSH_DURATION = Parameter("push_duration", TIME, _durations, resolution=Resolution(0, 2, None, 16))
+PUSH_DURATION = Parameter(
+    "push_duration", TIME, _durations, resolution=Resolution(0, 2, None, 16), lasting=True
+)
 
 
 class DisturbanceForce(AbstractLaw):
