@@ -9,6 +9,9 @@ MATTERS = 0.05
 # It takes half of the power that the model leaves: two parts of a record with parameters of their
 # own take p of J rows' power from noise, which is far less (see ROWS).
 HALF = 0.5
+# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
+# force's root mean square, cannot be told from the sensor whatever its p-value.
+LINEARITY = 2e-3
 
 
 class Design(NamedTuple):
@@ -19,6 +22,7 @@ class Design(NamedTuple):
     - `weight`: s, `(J,)`, zero where the axis does not slip one way; `time`: s, `(J,)`.
     - `shift`: by how much each parameter moves for a second by which the force is taken too late,
       `(P,)`, of the fit itself, which closed windows make of other rows than these.
+    - `velocity`: m/s, `(J,)`, through the same kernel.
     """
 
     columns: Float[Array, "J P"]
@@ -27,3 +31,4 @@ class Design(NamedTuple):
     weight: Float[Array, " J"]
     time: Float[Array, " J"]
     shift: Float[Array, " P"]
+    velocity: Float[Array, " J"] | None = None

@@ -84,14 +84,15 @@ def _looks(designs: Design) -> list[Look]:
     index = np.flatnonzero(good)
     if not len(index):
         return found
-    columns, used, designs = columns[index], used[index], Design(*(x[index] for x in designs))
+    columns, used = columns[index], used[index]
+    designs = jax.tree.map(lambda x: x[index], designs)
     slope = np.where(used, _slopes(designs, last[index]), 0.0)
     target, left = (np.where(used, x, 0.0) for x in (designs.target, designs.left))
     positive = np.maximum(target - left, 0.0)
     size = np.max(np.abs(columns), axis=1)
     size[size == 0] = 1.0
     values = np.stack([slope, positive], axis=2)
-    table = _triangle(np.concatenate([columns / size[:, None, :], values], axis=2))
+    table = triangle(np.concatenate([columns / size[:, None, :], values], axis=2))
     shares, plain = _least(table[:, :, :-2], table[:, :, -2:])
     shares /= size[:, :, None]
     own, other = np.moveaxis(values - columns @ shares, 2, 0)
@@ -129,7 +130,7 @@ def _dots(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.einsum("bj,bj->b", one, other)
 
 
-def _triangle(matrix: np.ndarray) -> np.ndarray:
+def triangle(matrix: np.ndarray) -> np.ndarray:
     """The triangular factor of each matrix, `(B, J, K)`; of tall ones by pieces in the cache."""
     count, rows, width = matrix.shape
     if rows > 4 * PIECE:
