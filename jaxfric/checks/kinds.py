@@ -290,6 +290,15 @@ KINDS = (
     ),
     Kind("curve_missed_at", False, ""),
     Kind(
+        "force_missed",
+        False,
+        "What the model leaves follows the force itself, by up to {value:.3g} {force}, most at "
+        "{at:.3g} {force}, and not as noise: a dead band of the actuator, a gain of its own for "
+        "each sign, or friction that grows with the load. The intervals do not count it, so that "
+        "parameters, Coulomb friction above all, may be off by more. jaxfric explain says more.",
+    ),
+    Kind("force_missed_at", False, ""),
+    Kind(
         "excerpt",
         False,
         "The recording is long: sixteen pieces, evenly spread over it, {value:.1%} of its samples, "

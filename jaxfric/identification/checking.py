@@ -87,7 +87,7 @@ def checked(
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
         if missed := checks.misfit(row_of(designs, i)):
-            warnings[i, MISSED : MISSED + 2] = missed
+            warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
@@ -147,9 +147,8 @@ def _by_velocity(found: Identified, row: int) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0) * np.array(powers)
 
 
-STRUCTURE, MISSED, ONE_SPEED, GAIN, NEGATIVE = map(
-    checks.NAMES.index,
-    ("structure_left", "curve_missed", "one_speed", "velocity_gain", "negative_parameter"),
+STRUCTURE, ONE_SPEED, GAIN, NEGATIVE = map(
+    checks.NAMES.index, ("structure_left", "one_speed", "velocity_gain", "negative_parameter")
 )
 
 
