@@ -131,12 +131,15 @@ def _dots(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def triangle(matrix: np.ndarray) -> np.ndarray:
-    """The triangular factor of each matrix, `(B, J, K)`; of tall ones by pieces in the cache."""
+    """The triangular factor of each matrix, `(B, J, K)`; of tall ones by pieces in the cache, so
+    small that LAPACK begins no threads for them.
+    """
     count, rows, width = matrix.shape
-    if rows > 4 * PIECE:
+    while rows > PIECE >= 2 * width:
         matrix = np.pad(matrix, ((0, 0), (0, -rows % PIECE), (0, 0)))
         pieces = matrix.reshape(count, -1, PIECE, width)
         matrix = np.asarray(np.linalg.qr(pieces, mode="r")).reshape(count, -1, width)
+        rows = matrix.shape[1]
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 
