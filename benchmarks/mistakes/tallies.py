@@ -67,7 +67,7 @@ def _beware(verdict: Answer, answer: Answer) -> bool:
     if answer.get("velocity_error", 0.0) > UNRESOLVED:
         signs -= OF_THE_DERIVATIVE
     if answer.get("lacks"):
-        signs -= {"structure_left"}
+        signs -= {"structure_left", "curve_missed", "force_missed"}
     undetermined = verdict["outcome"] == "refused" and signs <= UNDETERMINED
     no_warning = verdict["outcome"] == "warned" and signs <= {*UNSURE, "not_better", "creeps"}
     return verdict["outcome"] in ("refused", "warned") and not (undetermined or no_warning)

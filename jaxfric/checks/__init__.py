@@ -1,6 +1,6 @@
 """What is wrong with a recording or a fit, each fault with its name, its number and the remedy."""
 
-from .design import MATTERS as MATTERS, Design as Design
+from .design import LINEARITY as LINEARITY, MATTERS as MATTERS, Design as Design
 from .fitted import (
     LARGE as LARGE,
     LEFT as LEFT,
@@ -19,6 +19,7 @@ from .kinds import (
 )
 from .lateness import Lateness as Lateness, lateness as lateness, looks as looks
 from .lone import LONE as LONE, lone as lone
+from .misfit import Misfit as Misfit, misfit as misfit
 from .recorded import recorded as recorded, recorded_rows as recorded_rows
 from .structure import hides as hides
 

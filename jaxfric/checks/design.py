@@ -9,6 +9,9 @@ MATTERS = 0.05
 # It takes half of the power that the model leaves: two parts of a record with parameters of their
 # own take p of J rows' power from noise, which is far less (see ROWS).
 HALF = 0.5
+# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
+# force's root mean square, cannot be told from the sensor whatever its p-value.
+LINEARITY = 2e-3
 
 
 class Design(NamedTuple):
@@ -21,6 +24,7 @@ class Design(NamedTuple):
       `(P,)`, of the fit itself, which closed windows make of other rows than these.
     - `forward`: the columns of friction where the axis moves forward, zero elsewhere, `(J, k)`;
       `None` where the direction of the rows is not known.
+    - `velocity`: m/s, `(J,)`, through the same kernel.
     """
 
     columns: Float[Array, "J P"]
@@ -30,3 +34,4 @@ class Design(NamedTuple):
     time: Float[Array, " J"]
     shift: Float[Array, " P"]
     forward: Float[Array, "J k"] | None = None
+    velocity: Float[Array, " J"] | None = None

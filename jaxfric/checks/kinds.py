@@ -10,7 +10,8 @@ import numpy as np
 class Kind(NamedTuple):
     """A fault: its name, whether results beside it are certain to be wrong, and its sentence.
 
-    In the sentence `{value}` is the number found, `{force}` and `{position}` are the units.
+    In the sentence `{value}` is the number found, `{force}` and `{position}` are the units, `{at}`
+    is the number of the kind `NAME_at`. A kind without a sentence is such a number.
     """
 
     name: str
@@ -288,6 +289,25 @@ KINDS = (
         "it, and the parameters hold a part of that. jaxfric explain says what.",
     ),
     Kind(
+        "curve_missed",
+        False,
+        "The model misses the friction curve by up to {value:.3g} {force}, most at {at:.3g} "
+        "{position}/s, and not as noise: its law of velocity is another one than the axis's. The "
+        "intervals hold noise and not a wrong law, so that parameters may be off by more. Add what "
+        "is curved there (a Stribeck bump, a drag that grows or thins with the speed), or try "
+        "jaxfric select; jaxfric explain says what fits.",
+    ),
+    Kind("curve_missed_at", False, ""),
+    Kind(
+        "force_missed",
+        False,
+        "What the model leaves follows the force itself, by up to {value:.3g} {force}, most at "
+        "{at:.3g} {force}, and not as noise: a dead band of the actuator, a gain of its own for "
+        "each sign, or friction that grows with the load. The intervals do not count it, so that "
+        "parameters, Coulomb friction above all, may be off by more. jaxfric explain says more.",
+    ),
+    Kind("force_missed_at", False, ""),
+    Kind(
         "excerpt",
         False,
         "The recording is long: sixteen pieces, evenly spread over it, {value:.1%} of its samples, "
@@ -345,9 +365,12 @@ def _guess(name: str, value: float) -> str:
 def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
     """The sentences of one recording's numbers, `(W,)`, the severe ones first."""
     found = []
-    for kind, value in zip(KINDS, np.asarray(values, float), strict=True):
-        if np.isnan(value):
+    numbers = dict(zip(NAMES, map(float, np.asarray(values, float)), strict=True))
+    for kind in KINDS:
+        value = numbers[kind.name]
+        if np.isnan(value) or not kind.text:
             continue
-        text = kind.text.format(value=float(value), guess=_guess(kind.name, float(value)), **units)
+        at = numbers.get(f"{kind.name}_at", np.nan)
+        text = kind.text.format(value=value, at=at, guess=_guess(kind.name, value), **units)
         found.append(Remark(kind.name, text, kind.severe))
     return tuple(sorted(found, key=lambda remark: not remark.severe))

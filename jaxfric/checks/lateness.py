@@ -92,7 +92,7 @@ def _looks(designs: Design) -> list[Look]:
     size = np.max(np.abs(columns), axis=1)
     size[size == 0] = 1.0
     values = np.stack([slope, positive], axis=2)
-    table = _triangle(np.concatenate([columns / size[:, None, :], values], axis=2))
+    table = triangle(np.concatenate([columns / size[:, None, :], values], axis=2))
     shares, plain = _least(table[:, :, :-2], table[:, :, -2:])
     shares /= size[:, :, None]
     own, other = np.moveaxis(values - columns @ shares, 2, 0)
@@ -130,13 +130,16 @@ def _dots(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.einsum("bj,bj->b", one, other)
 
 
-def _triangle(matrix: np.ndarray) -> np.ndarray:
-    """The triangular factor of each matrix, `(B, J, K)`; of tall ones by pieces in the cache."""
+def triangle(matrix: np.ndarray) -> np.ndarray:
+    """The triangular factor of each matrix, `(B, J, K)`; of tall ones by pieces in the cache, so
+    small that LAPACK begins no threads for them.
+    """
     count, rows, width = matrix.shape
-    if rows > 4 * PIECE:
+    while rows > PIECE >= 2 * width:
         matrix = np.pad(matrix, ((0, 0), (0, -rows % PIECE), (0, 0)))
         pieces = matrix.reshape(count, -1, PIECE, width)
         matrix = np.asarray(np.linalg.qr(pieces, mode="r")).reshape(count, -1, width)
+        rows = matrix.shape[1]
     return np.asarray(np.linalg.qr(matrix, mode="r"))
 
 

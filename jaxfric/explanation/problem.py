@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..checks import LINEARITY as LINEARITY
 from ..data.recording import Recording
 from ..terms import KNOWN_FEEDBACK
 from ..terms.base import AbstractTerm
@@ -34,11 +35,6 @@ BETWEEN = 4 / 3
 PERSISTS = 2**-1.25
 # Rows through that kernel and through the widest; `None` where too few would be left.
 WideKernels = tuple[Evidence | None, Evidence | None]
-
-
-# The linearity of a good torque or current sensor, relative: a force below it, with respect to the
-# force's root mean square, cannot be told from the sensor whatever its p-value.
-LINEARITY = 2e-3
 
 
 class Problem(NamedTuple):

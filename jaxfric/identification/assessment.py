@@ -167,7 +167,7 @@ def solved(
             columns = weak.columns(known, recording)
             left = weak.target - weak.offset(known, recording) - columns @ alpha
         spread = uncertainty.deviations(jacobian, error, weight, place)
-        design = _design(known, columns, left, weak, shift)
+        design = _design(known, columns, left, weak, shift, recording)
         return Solved(alpha, spread, design, jnp.zeros_like(alpha))
     offset = known.offset(recording)
     weighed = weighing.weigh(alpha, jacobian, offset, place, recording, weak)
@@ -191,7 +191,7 @@ def solved(
     return Solved(
         jnp.insert(alpha, index[0], weighed.mass),
         spread,
-        _design(term, _inserted(weighed.columns, index[0]), weighed.left, weak, shift),
+        _design(term, _inserted(weighed.columns, index[0]), weighed.left, weak, shift, recording),
         jnp.insert(pull, index[0], 0.0),
     )
 
@@ -208,11 +208,12 @@ def _inserted(columns: Float[Array, "J p"], index: int) -> Float[Array, "J p"]:
     return jnp.concatenate([others[:, :index], columns[:, :1], others[:, index:]], axis=1)
 
 
-def _design(term, columns, left, weak: Rows, shift) -> Design:
+def _design(term, columns, left, weak: Rows, shift, recording) -> Design:
     weight = weak.positive + weak.negative
     friction = columns[:, np.flatnonzero(_by_velocity(term))]
     forward = jnp.where((weak.positive > 0)[:, None], friction, 0.0)
-    return Design(columns, weak.target, left, weight, weak.time, shift, forward)
+    velocity = weak.project(recording.velocity[:, None])[:, 0]
+    return Design(columns, weak.target, left, weight, weak.time, shift, forward, velocity)
 
 
 def unseen(term, active, jacobian, weight) -> Bool[Array, " P"]:
@@ -252,7 +253,7 @@ def passive(term, alpha, matrix, design: Design, weak: Rows, recording) -> Bool[
     friction = _by_velocity(term)
     if not friction.any():
         return passive
-    speed = jnp.abs(weak.project(recording.velocity[:, None])[:, 0])
+    speed = jnp.abs(design.velocity)
     forward, backward = weak.positive > 0, weak.negative > 0
     middle = jnp.nanmedian(jnp.where(forward | backward, speed, jnp.nan))
     for half in (speed <= middle, speed > middle):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..checks import NAMES
+from ..checks import KINDS
 from ..looks.text import A_ROW, Block, Table
 from ..models import name_of
 
@@ -63,9 +63,9 @@ def _warnings(found: Any) -> list[str]:
     """Each fault that was found, and in which rows."""
     there = np.isfinite(found.warnings.reshape(-1, found.warnings.shape[-1]))
     return [
-        f"Warning: {name.replace('_', ' ')} in {_rows(np.flatnonzero(column))}."
-        for name, column in zip(NAMES, there.T, strict=True)
-        if column.any()
+        f"Warning: {kind.name.replace('_', ' ')} in {_rows(np.flatnonzero(column))}."
+        for kind, column in zip(KINDS, there.T, strict=True)
+        if kind.text and column.any()
     ]
 
 

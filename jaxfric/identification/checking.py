@@ -86,6 +86,8 @@ def checked(
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
+        if missed := checks.misfit(row_of(designs, i)):
+            warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
