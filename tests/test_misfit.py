@@ -105,7 +105,7 @@ def design(curve, seed=0, unit=(1.0, 1.0), slow=0.0):
         1,
     )
     left = force - columns @ np.linalg.lstsq(columns, force, rcond=None)[0]
-    return Design(columns, force, left, np.ones(len(v)), time, np.zeros(4), v)
+    return Design(columns, force, left, np.ones(len(v)), time, np.zeros(4), velocity=v)
 
 
 @settings(max_examples=40)
