@@ -21,7 +21,7 @@ from .earlier import Earlier, changed, obeyed, rephased
 from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
-from .holdout import check_signals, confirmed
+from .holdout import check_signals, confirmed, measured
 from .improvement import Improved, improved, without_unsure
 from .inputs import Inputs, prepare
 from .mismatch import Mismatch, mismatch
@@ -30,6 +30,7 @@ from .parsimony import instead
 from .problem import Problem, problem_of, with_holdout
 from .search import at_given, nothing, obeying, searched
 from .summary import facts, summarise
+from .uncertainty import estimated
 
 
 def explain(
@@ -135,6 +136,7 @@ def _explain(
             inputs.figures.held_from(place)
         remarks += zero.integrated(better.findings, place)
         better = confirmed(better, held, inputs.figures)
+        wrong, better = _known_there(known, wrong, better, inputs)
     else:
         remarks += zero.integrated(better.findings, None)
     doing("locating what is left")
@@ -212,8 +214,53 @@ def _judged(
         wrong = wrong._replace(rivals=rivals)
         if one is not None and _wrong(known, one, seed) is None:
             findings, wrong = one, None
+    wrong = _sure(known, findings, wrong, inputs)
     doing("predicting with the improved model")
     return wrong, _improved(known, findings, wrong, inputs)
+
+
+def _sure(
+    known: Baseline, findings: Findings, wrong: Mismatch | None, inputs: Inputs
+) -> Mismatch | None:
+    """The wrong values without those whose told interval holds the value as given.
+
+    A simulator's own are told apart later, since those of one body are needed together; and what
+    has changed since an earlier recording is tested by the errors of both.
+    """
+    model = known.model
+    if model is None or known.errors is not None or inputs.attributes:
+        return wrong
+    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
+    while wrong is not None and wrong.moved:
+        free = tuple(wrong.moved)
+        values = estimated(at_given(model, findings, free), free)[0]
+        away = {
+            i: abs(float(values[names[i]].value) - before) / float(values[names[i]].half_width())
+            for i, before in wrong.moved.items()
+        }
+        least = min(away, key=lambda i: away[i])
+        if away[least] > 1:
+            return wrong
+        moved = {i: before for i, before in wrong.moved.items() if i != least}
+        instead = {i: others for i, others in wrong.instead.items() if i != least}
+        wrong = wrong._replace(moved=moved, instead=instead)
+    return None
+
+
+def _known_there(
+    known: Baseline, wrong: Mismatch | None, better: Improved, inputs: Inputs
+) -> tuple[Mismatch | None, Improved]:
+    """The wrong values that are told apart from those given beside the held-out recording, too."""
+    less = _sure(known, better.findings, wrong, inputs) if better.refitted else wrong
+    if wrong is None or known.model is None or less == wrong:
+        return wrong, better
+    free = () if less is None else tuple(less.moved)
+    given = without_unsure(at_given(known.model, better.findings, free))
+    fewer = better._replace(findings=given, refitted=less is not None)
+    fewer = measured(fewer, inputs.figures)
+    if fewer.after.worse(fewer.before, inputs.figures.rounding):
+        return wrong, better
+    return less, fewer
 
 
 def _wrong(known: Baseline, findings: Findings, seed: int) -> Mismatch | None:

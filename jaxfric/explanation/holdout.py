@@ -57,20 +57,20 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     ])  # fmt: skip
     better = better._replace(claimed=findings)
     better = _refuting(better, findings, [n for n, each in enumerate(borne) if each is False])
-    better = _measured(better, figures)
+    better = measured(better, figures)
     tested = tuple(n for n, each in enumerate(borne) if each is not None)
     if better.after.worse(better.before, figures.rounding) and tested != better.refuted:
         borne_out = better.findings.selection.selected
         others = [n for n, selected in enumerate(borne_out) if selected.confirmed]
         worse = better.before, better.after
         better = _refuting(better, better.findings, others)._replace(refuted=tested, worse=worse)
-        better = _measured(better, figures)
+        better = measured(better, figures)
     if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
-        better = _measured(_without_nil(_at_base_values(better)), figures)
+        better = measured(_without_nil(_at_base_values(better)), figures)
     if better.after.worse(better.before, figures.rounding):
         base, every = findings.at_base(better.first), tuple(range(len(borne)))
         better = better._replace(findings=base, refitted=False, refuted=every)
-        better = _measured(better, figures)
+        better = measured(better, figures)
     return better
 
 
@@ -118,7 +118,7 @@ def _without_nil(better: Improved) -> Improved:
     return _refuting(better, findings, gone)._replace(refuted=tuple(sorted(refuted)))
 
 
-def _measured(better: Improved, figures: Figures) -> Improved:
+def measured(better: Improved, figures: Figures) -> Improved:
     """With the errors of both models on both recordings, over the same samples."""
     findings = better.findings
     before = errors_of_base(findings.at_base(better.first), findings, figures)

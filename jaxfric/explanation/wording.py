@@ -6,6 +6,7 @@ from typing import Any
 
 from ..checks import LEFT
 from ..terms.effects import EFFECTS
+from .fewest import SHAPE
 from .finding import Finding
 
 VERDICTS = {
@@ -129,10 +130,20 @@ def adjusted(fit: Mapping[str, Any]) -> str:
 ELSEWHERE = 2.0
 
 
+def _found_of(fit: Mapping[str, Any]) -> float:
+    """The part of the held-out force, through the filter, that the findings account for."""
+    errors = fit["filtered_holdout_force_error"]
+    return math.sqrt(max(errors["before"] ** 2 - errors["after"] ** 2, 0.0))
+
+
 def _not_determined(fit: Mapping[str, Any]) -> list[str]:
     """That other values hold on the held-out recording, or none that this one determines."""
     refitted = fit.get("filtered_holdout_refitted_error")
     if refitted is None or fit["filtered_holdout_force_error"]["after"] <= ELSEWHERE * refitted:
+        return []
+    # Of what was found a tenth of the amplitude may be another shape than the law's.
+    small = fit["filtered_holdout_force_error"]["after"] < SHAPE * _found_of(fit)
+    if small and not fit.get("holdout_values"):
         return []
     through = f"{fit['filtered_holdout_force_error']['after']:.2%}"
     text = (

@@ -13,6 +13,7 @@ from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.errors import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
+from ...simulators.columns import GAIN
 from ..explained import Explanation
 from ..figures import Figures, cast
 from ..finding import Finding
@@ -166,7 +167,7 @@ def _corrected(
 
 def with_checks(found: Explanation, checked: CheckedSimulator, x64: bool) -> Explanation:
     """An explanation with what was looked at first: its table, and findings for what was wrong."""
-    rows = [check.to_dict() for check in checked.checks]
+    rows = [_beside(found, check).to_dict() for check in checked.checks]
     found = dataclasses.replace(found, sanity=rows)
     findings = [] if checked.wrong else _findings(checked)
     if not findings:
@@ -174,6 +175,16 @@ def with_checks(found: Explanation, checked: CheckedSimulator, x64: bool) -> Exp
     before, after = checked.power
     left = after / before if before > 0 else 1.0
     return with_preceding(found, findings, left, _before(found, checked, x64))
+
+
+def _beside(found: Explanation, check: Check) -> Check:
+    """A torque constant that would do by itself, where beside the findings it is not wrong."""
+    names = [name for finding in found.findings for name in finding.parameters]
+    told = any(name == GAIN or name.endswith("/gear") for name in names)
+    if not (check.wrong and check.effect == "force_gain" and names) or told:
+        return check
+    text = f"By wrong values alone: {check.text} Beside what was found it is not told from one."
+    return check._replace(wrong=False, text=text)
 
 
 def _before(found: Explanation, checked: CheckedSimulator, x64: bool) -> dict[str, float]:

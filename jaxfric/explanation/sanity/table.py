@@ -86,10 +86,11 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
         text = f"The force is counted the other way: it is {quantity(times)} times the simulator's."
         return [Check("force_sign", text, True, value=times, parameter="gain")]
     if chosen and told:
-        text = f"The torque constant is {size} times the simulator's."
+        unit = _unit(1 + value)
+        text = f"The torque constant is {size} times the simulator's{unit}."
         return [
             Check("force_sign", "The force has the simulator's sign."),
-            Check("force_gain", text, True, value=times, parameter="gain"),
+            Check("force_gain", text, True, bool(unit), value=times, parameter="gain"),
         ]
     text = f"The torque constant is the simulator's ({size} times it, by itself)."
     if not np.isfinite(error):
@@ -100,6 +101,21 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
         Check("force_sign", "The force has the simulator's sign."),
         Check("force_gain", text, value=times, parameter="gain"),
     ]
+
+
+# Prefixes of SI: a torque constant that is a thousand times another is a unit.
+PREFIX, NEAR = 3, 0.05
+
+
+def _unit(times: float) -> str:
+    """What a factor near a power of a thousand is rather."""
+    order = round(np.log10(times) / PREFIX)
+    if order == 0 or abs(times / 10.0 ** (PREFIX * order) - 1) > NEAR:
+        return ""
+    return (
+        f", nearly 10^{PREFIX * order}: force and simulated force are in other units (N and kN, "
+        "mN·m and N·m). Name them: --units force=UNIT, or --scale known_force=FACTOR"
+    )
 
 
 def _zeros(part: Part, seen: FaultSearch) -> list[Check]:
