@@ -339,3 +339,26 @@ def test_a_motion_that_repeats_and_a_force_of_another_unit_are_no_clock():
     log = Recording(time, current, count * np.round(position / count), units=UNITS)
     (joint,) = check_logs([Part(log, None, Known(needed))])
     assert not wrong(joint).keys() & {"clock", "force_limit", "end_stop"}
+
+
+def test_a_factor_of_a_thousand_is_a_unit(motion):
+    time, position, force = motion
+    recording = Recording(time, 1000 * force[:, 1], position[:, 1], units=UNITS)
+    (checked,) = check_logs([Part(recording, None, Known(force[:, 1]))])
+    assert "nearly 10^3" in checked.wrong and "--units" in checked.wrong
+    (checked,) = check_logs([Part(recording, None, Known(800 * force[:, 1]))])
+    assert checked.wrong is None and "1.25" in wrong(checked)["force_gain"].text
+
+
+def test_a_force_that_acts_by_its_own_state_says_nothing_of_the_torque_constant(motion):
+    """What wrong values leave is most of it: neither their size nor their sign is told."""
+    time, position, force = motion
+    speed, state, states = np.gradient(position[:, 1], time), 0.0, []
+    for each in speed * (time[1] - time[0]):
+        state += each / 0.2 - abs(each) / 0.2 * state
+        states.append(state)
+    level = 3 * np.std(force[:, 1])
+    real = force[:, 1] + level * np.array(states)
+    recording = Recording(time, real, position[:, 1], units=UNITS)
+    (checked,) = check_logs([Part(recording, None, Known(force[:, 1] + level * np.sign(speed)))])
+    assert not {"force_gain", "force_sign"} & set(wrong(checked))

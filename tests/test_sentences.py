@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
-from jaxfric.explanation.sentences import sentence
+from jaxfric.explanation.sentences import mismatch_sentence, sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effect import Extent
 
@@ -124,3 +125,31 @@ def test_curved_and_warming_friction_are_told_with_their_sizes(effect, values, w
         name: estimate(value, 0.01 * abs(value), unit) for name, (value, unit) in values.items()
     }
     assert words in sentence(effect, told, 0.5, ())
+
+
+def moved(value, error, before):
+    return Moved(before, estimate(value, error, "N"))
+
+
+def test_values_that_all_differ_by_one_factor_are_said_to():
+    alike = {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 0.01, 5.0)}
+    text = mismatch_sentence(alike, 0.9)
+    assert "all of them 0.8000 ± 0.0018 times what they were" in text and "torque constant" in text
+    for other in (
+        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.2, 0.01, 5.0)},
+        {"coulomb": moved(0.8, 0.001, 1.0)},
+        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 4.0, 5.0)},
+        {"coulomb": moved(0.8, 0.001, 0.0), "viscous": moved(4.0, 0.01, 0.0)},
+    ):
+        assert "all of them" not in mismatch_sentence(other, 0.9)
+
+
+def test_a_small_share_is_no_nothing():
+    assert "under 1% of the unexplained force" in mismatch_sentence(
+        {"c": moved(1, 0.1, 2.0)}, 0.002
+    )
+
+
+def test_a_delay_that_may_be_none_is_at_most_so_long():
+    text = sentence("transport_delay", {"delay": estimate(0.7e-3, 0.4e-3, "s")}, 0.5, ())
+    assert "acts at most 1.5 ms late" in text

@@ -85,6 +85,7 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     if 1 + value + _half(error) < 0 and chosen and told:
         text = f"The force is counted the other way: it is {quantity(times)} times the simulator's."
         return [Check("force_sign", text, True, value=times, parameter="gain")]
+    told &= 1 + value - _half(error) > 0  # else the simulator's force is not in the log at all
     if chosen and told:
         unit = _unit(1 + value)
         text = f"The torque constant is {size} times the simulator's{unit}."
@@ -95,8 +96,10 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     text = f"The torque constant is the simulator's ({size} times it, by itself)."
     if not np.isfinite(error):
         text = "The motion cannot tell the torque constant."
-    elif chosen and seen.left > LEAVES:
-        text = "Wrong values leave most of the mismatch: of the torque constant they say nothing."
+    elif chosen and abs(value) > LINEARITY:
+        text = (
+            "Wrong values do not account for the mismatch: of the torque constant they say nothing."
+        )
     return [
         Check("force_sign", "The force has the simulator's sign."),
         Check("force_gain", text, value=times, parameter="gain"),
