@@ -39,12 +39,11 @@ def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: flo
         inverse = np.linalg.pinv(columns[:, better], rcond=RANK)
         other = np.zeros(len(used))
         other[list(better)] = inverse @ residual
-        if not _sure(columns @ other, inverse, other[list(better)], residual, block):
-            break
+        # One value may hide what two say: an offset and a stiffness about another place, say.
+        sure = _sure(columns @ other, inverse, other[list(better)], residual, block)
         more = _removed(gram, pull, better) - taken
-        if more < (SHAPE * np.max(np.abs(other - parts))) ** 2:
-            break
-        found, parts, taken = better, other, taken + more
+        if sure and more >= (SHAPE * np.max(np.abs(other - parts))) ** 2:
+            found, parts, taken = better, other, taken + more
     if len(found) == MOST_WRONG and most - taken >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
