@@ -52,6 +52,8 @@ LAWS = {
     "tone": terms.PeriodicDisturbance(2.0),
     "load drift": terms.LoadDrift(start=-0.8, duration=1.5, degree=5),
     "pulses": terms.DisturbancePulses((-0.4, 0.5), 0.2),
+    "push": terms.DisturbanceForce(-0.3, 0.5),
+    "push ramps": terms.DisturbanceForce(-0.3, 0.5, ramp=0.2),
     "table over position": terms.Table("position", (-0.5, 0.0, 0.2, 0.7)),
     "table over velocity": terms.Table("velocity", (0.0, 0.3)),
     "directional table": Directional(terms.Table("position", (-0.5, 0.1, 0.7))),

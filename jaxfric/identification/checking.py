@@ -86,7 +86,9 @@ def checked(
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
-        if missed := checks.misfit(row_of(designs, i)):
+        # A force that is late by cycles bends the curve, too.
+        late_force = suspect[i] and not np.isnan(fitted[LATE])
+        if not late_force and (missed := checks.misfit(row_of(designs, i))):
             warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
@@ -147,8 +149,9 @@ def _by_velocity(found: Identified, row: int) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0) * np.array(powers)
 
 
-STRUCTURE, ONE_SPEED, GAIN, NEGATIVE = map(
-    checks.NAMES.index, ("structure_left", "one_speed", "velocity_gain", "negative_parameter")
+STRUCTURE, ONE_SPEED, GAIN, NEGATIVE, LATE = map(
+    checks.NAMES.index,
+    ("structure_left", "one_speed", "velocity_gain", "negative_parameter", "force_late"),
 )
 
 

@@ -51,7 +51,7 @@ class DisturbanceForce(AbstractLaw):
     def text(self, s, begin, duration):
         begun = stepped_text(s, begin, self.ramp)
         over = stepped_text(s, f"({begin} + {duration})", self.ramp)
-        return (f"({begun}) - ({over})",)
+        return (f"(({begun}) - ({over}))",)
 
     @property
     def switched(self):
