@@ -49,9 +49,9 @@ class DisturbanceForce(AbstractLaw):
         return (begun - over,)
 
     def text(self, s, begin, duration):
-        begun = stepped_text(s, begin, self.ramp)
-        over = stepped_text(s, f"({begin} + {duration})", self.ramp)
-        return (f"(({begun}) - ({over}))",)
+        end = f"({begin} + {duration})" if self.ramp else f"{begin} + {duration}"
+        begun, over = (stepped_text(s, moment, self.ramp) for moment in (begin, end))
+        return (f"({begun} - {over})",)
 
     @property
     def switched(self):
