@@ -40,10 +40,12 @@ def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: flo
         other = np.zeros(len(used))
         other[list(better)] = inverse @ residual
         # One value may hide what two say: an offset and a stiffness about another place, say.
-        sure = _sure(columns @ other, inverse, other[list(better)], residual, block)
+        if not _sure(columns @ other, inverse, other[list(better)], residual, block):
+            continue
         more = _removed(gram, pull, better) - taken
-        if sure and more >= (SHAPE * np.max(np.abs(other - parts))) ** 2:
-            found, parts, taken = better, other, taken + more
+        if more < (SHAPE * np.max(np.abs(other - parts))) ** 2:
+            break
+        found, parts, taken = better, other, taken + more
     if len(found) == MOST_WRONG and most - taken >= enough:
         return used.tolist()
     return [int(used[i]) for i in found]
