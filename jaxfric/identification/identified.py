@@ -100,7 +100,8 @@ class Identified(eqx.Module):
       holds what a force that acts up to one and a half samples late makes of the parameters.
     - `result`: a member of [`Result`][].
     - `windows`, `covered`: how many windows were used and which share of the slip they hold: of its
-      time or, in closed windows, of its squared speed in one direction, whichever is least.
+      time or, in closed windows, the root of that of its squared speed in one direction, whichever
+      is least.
     - `filtered_force_error`: norm(u − û)/norm(u) of the rows of the weak form in slip, inertia
       included: what `predict` misses through the kernel that the rows have.
     - `cost`: the minimum of the reduced cost, N²·s.

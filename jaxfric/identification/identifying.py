@@ -26,10 +26,10 @@ from .projections import AbstractProjection, Rows, WeakForm
 from .search import Found, search
 from .setup import Setup, all_finite, ready_rows, sanitised, set_up, structure, together
 
-# Closed windows that use less than this share of the slip time, or of the squared speed in one
-# direction, leave most of the record's information on the floor: the latter is what tells viscous
-# friction, and a move that ends elsewhere may be the only fast one. Then the weak form, which needs
-# no closing, is the better choice.
+# Closed windows that use less than this share of the slip time leave most of the record's
+# information on the floor; those with less than this root of the squared speed's share, in one
+# direction, tell its viscous friction half as well as all of it would: a move that ends elsewhere
+# may be the only fast one. Then the weak form, which needs no closing, is the better choice.
 LEAST_COVERED = 0.5
 
 # Samples at once that keep an accelerator busy: some hundred numbers for each are 3 GB.
@@ -55,8 +55,8 @@ def identify(
       leading axis, and what goes wrong in a row stays in that row.
     - `projection`: `ClosedWindows()` (mass and acceleration cancel; the paper) or
       `WeakForm(half_width)`; by default the terms decide, and closed windows that would
-      use less than half of the slip time, or of the squared speed in one direction, give way to
-      the weak form.
+      use less than half of the slip time, or a quarter of the squared speed in one direction, give
+      way to the weak form.
     - `bounds`: lower and upper bound of nonlinear parameters by name; else from the recording.
     - `grid`: points a side of the grid over the nonlinear parameters.
     - `align`: find by how much the force acts after its time stamp, half a sample for one that is

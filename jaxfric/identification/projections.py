@@ -35,8 +35,9 @@ class Rows(eqx.Module):
     - `moving`: weights of the rows over which errors are taken: reversals too, rest not, `(J,)`.
     - `time`: s, `(J,)`.
     - `windows`: how many windows (or, in the weak form, slip stretches) were used.
-    - `covered`: share of the valid slip that the rows use: of its time or, in closed windows, of
-      its squared speed in a direction that is not rare, whichever is least.
+    - `covered`: share of the valid slip that the rows use: of its time or, in closed windows, the
+      root of that of its squared speed in a direction that is not rare, whichever is least. By so
+      much viscous friction is better known from all of the slip.
     """
 
     target: Float[Array, " J"]
@@ -136,7 +137,7 @@ class ClosedWindows(AbstractProjection):
         for weights, side in ((positive, 1.0), (negative, -1.0)):
             ours = jnp.where(side * recording.velocity > 0, moving, 0.0)
             whole, often = jnp.sum(ours * square), jnp.sum(ours) >= RARE * jnp.sum(moving)
-            part = jnp.sum(weights * square) / jnp.where(whole > 0, whole, 1.0)
+            part = jnp.sqrt(jnp.sum(weights * square) / jnp.where(whole > 0, whole, 1.0))
             covered = jnp.where(often & (whole > 0), jnp.minimum(part, covered), covered)
         force, time = recording.force, recording.time
         return Rows(force, positive, negative, moving, time, windows, covered)
