@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+import types
 
 import equinox as eqx
 import jax
@@ -11,9 +12,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import jaxfric as jf
-from jaxfric.identification import identifying
+from jaxfric.identification import assessment, identifying
 from jaxfric.identification.identified import result_names
 from jaxfric.simulation.errors import force_error
+from jaxfric.terms.sample import Parameter
 from tests.machines import relative_error
 
 RATE = 1000.0
@@ -623,3 +625,23 @@ def test_a_given_width_gives_inside_jit_what_a_call_gives(recorded):
     traced = jax.jit(lambda log: fit(log, jf.WeakForm(width)))(ready)
     np.testing.assert_allclose(traced, called, rtol=1e-10)
     np.testing.assert_allclose(called, fit(log), rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (("viscous", "stribeck_velocity"), True),
+        (("viscous+", "stribeck_velocity+"), True),
+        (("viscous+", "stribeck_velocity"), True),
+        (("viscous", "stribeck_velocity-"), True),
+        (("viscous+", "stribeck_velocity-"), False),
+        (("viscous_asymmetry", "stribeck_velocity"), False),
+        (("coulomb", "stribeck_velocity"), False),
+        (("viscous", "pitch"), False),
+    ],
+)
+def test_only_viscous_friction_of_a_bumps_direction_says_that_it_still_falls(names, told):
+    slope, bump = map(Parameter, names)
+    term = types.SimpleNamespace(affine=(slope,), nonlinear=(bump,))
+    found = assessment.still_falling(term, jnp.array([-1.0]), jnp.diag(jnp.array([0.01, 1.0])))
+    assert bool(found) == told

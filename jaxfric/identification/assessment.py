@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .. import signals
+from .. import checks, signals
 from ..checks import Design
 from ..terms.base import AbstractTerm, summands
 from ..terms.friction import STRIBECK_VELOCITY
@@ -290,17 +290,21 @@ def still_falling(term, alpha, matrix) -> Bool[Array, ""]:
     the same direction, it is a flank of a bump wider than the bounds. Inside them another shape
     then takes the place of that bump, and every parameter is of it.
     """
-    bumps = {p.name[-1] for p in term.nonlinear if p.name.startswith(STRIBECK_VELOCITY.name)}
-    either = bumps - {"+", "-"}
+    bumps = {_sides(p.name) for p in term.nonlinear if p.name.startswith(STRIBECK_VELOCITY.name)}
     slopes = [
-        p.name.startswith("viscous") and bool(either or p.name[-1] in bumps or p.name == "viscous")
+        checks.passive(p.name) == "viscous" and any(set(_sides(p.name)) & set(b) for b in bumps)
         for p in term.affine
     ]
-    if not bumps or not any(slopes):
+    if not any(slopes):
         return jnp.zeros((), bool)
     bound = uncertainty.student_quantile(0.975, uncertainty.COSINES)
     most = alpha + bound * jnp.sqrt(jnp.diagonal(matrix)[: alpha.size])
     return jnp.any((most < 0) & np.array(slopes))
+
+
+def _sides(name: str) -> str:
+    """The directions of motion that a parameter is of, "+", "-" or both."""
+    return name[-1] if name.endswith(("+", "-")) else "+-"
 
 
 def verdict(finite, slipping, closed, hidden, border, converged, ambiguous, odd: Oddities):

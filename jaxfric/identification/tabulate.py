@@ -275,7 +275,7 @@ def _sanity(document: Mapping[str, Any]) -> list[Block]:
     rows = document.get("sanity") or []
     named = {finding["effect"] for finding in document["findings"]}
     wrong = [row["text"] for row in rows if row["wrong"] and row["check"] not in named]
-    right = sorted({row["check"].replace("_", " ") for row in rows if not row["wrong"]})
+    right = sorted({row["check"].replace("_", " ") for row in rows if row["wrong"] is False})
     lines = [f"looked at first: {text}" for text in wrong]
     if right:
         lines.append(f"looked at first, and right: {', '.join(right)}")

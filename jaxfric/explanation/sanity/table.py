@@ -20,15 +20,15 @@ from .wiring import Wiring
 class Check(NamedTuple):
     """One thing that was looked at.
 
-    - `effect`: its public name; `text`: what there is to say; `wrong`, and whether nothing can be
-      named beside it, `severe`.
+    - `effect`: its public name; `text`: what there is to say; `wrong`, `None` where that cannot be
+      told, and whether nothing can be named beside it, `severe`.
     - `value` where it is one, as the `parameter`; `attribute`, the simulator's own name; `share`,
       of the mismatch, where it is this one's alone.
     """
 
     effect: str
     text: str
-    wrong: bool = False
+    wrong: bool | None = False
     severe: bool = False
     value: Estimate | None = None
     parameter: str = ""
@@ -93,20 +93,23 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
             Check("force_sign", "The force has the simulator's sign."),
             Check("force_gain", text, True, bool(unit), value=times, parameter="gain"),
         ]
-    text = f"The torque constant is the simulator's ({size} times it, by itself)."
+    text, unknown = f"The torque constant is the simulator's ({size} times it, by itself).", True
     if not np.isfinite(error):
         text = "The motion cannot tell the torque constant."
     elif chosen and abs(value) > LINEARITY:
         text = (
             "Wrong values do not account for the mismatch: of the torque constant they say nothing."
         )
+    else:
+        unknown = False
     return [
         Check("force_sign", "The force has the simulator's sign."),
-        Check("force_gain", text, value=times, parameter="gain"),
+        Check("force_gain", text, None if unknown else False, value=times, parameter="gain"),
     ]
 
 
-# Prefixes of SI: a torque constant that is a thousand times another is a unit.
+# Prefixes of SI: a torque constant that is a thousand times another is a unit. A data sheet tells
+# it to some per cent.
 PREFIX, NEAR = 3, 0.05
 
 
