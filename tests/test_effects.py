@@ -52,6 +52,8 @@ CASES = {
     "gain_asymmetry": (T.GainAsymmetry(), (0.1,)),
     "delay": (T.TransportDelay(), (0.002,)),
     "lag": (T.ActuatorLag(), (0.002,)),
+    "clock": (T.ClockOffset(), (0.002,)),
+    "filter": (T.SensorFilter(), (0.002,)),
     "dahl": (T.Dahl(0.002), (18.0,)),
     "lugre": (T.LuGre(0.002, 0.02), (18.0, 5.0)),
     "frictional_lag": (T.FrictionalLag(0.05, T.Gaussian(0.05)), (4.0,)),
@@ -654,7 +656,8 @@ def test_the_catalogue_holds_together():
         "parameter_mismatch asymmetric_friction stribeck viscous_nonlinearity gravity_unbalance "
         "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
-        "compliance transport_delay actuator_lag actuator_deadband actuator_saturation "
+        "compliance transport_delay actuator_lag clock sensor_filter actuator_deadband "
+        "actuator_saturation "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
         "periodic_disturbance disturbance_force disturbance_pulses cross_axis parameter_step"
     )

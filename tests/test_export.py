@@ -483,6 +483,7 @@ def test_a_table_without_a_range_asks_for_one():
         ("c", terms.LoadDependentFriction("load"), "load_dependent_friction: it needs load, which"),
         ("c", terms.TransportDelay(), "delay: hand over the motion commanded 0.* s later instead$"),
         ("modelica", terms.ActuatorLag(), "actuator_lag: hand over .* instead, to first order"),
+        ("c", terms.SensorFilter(), "sensor_filter: the log's alone, and the machine has none"),
         ("fmu", terms.KnownForce(), "the other simulator's force: add to it"),
         ("table", terms.GainAsymmetry(), "gain_asymmetry: it depends on the whole force"),
         ("table", terms.ThermalDrift(time_constant=2.0), "thermal_drift: it has no form there"),

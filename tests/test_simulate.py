@@ -18,7 +18,7 @@ from jaxfric.simulation.control import PD, PID, Cascade, Encoder
 from jaxfric.simulation.prediction import predict
 from jaxfric.simulation.simulating import simulate
 from jaxfric.simulation.substeps import default_substeps
-from jaxfric.terms import AbstractLaw, Parameter, TransportDelay
+from jaxfric.terms import AbstractLaw, Parameter, SensorFilter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
 from tests.machines import relative_error
 
@@ -340,6 +340,29 @@ def test_emps_in_closed_loop_meets_the_published_simulation_error():
     force = jnp.linalg.norm(out.force - recording.force) / jnp.linalg.norm(recording.force)
     assert float(position) < 0.0004
     assert float(force) < 0.08
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lag", [2e-4, 0.03])
+def test_a_filtered_force_is_predicted_as_it_is_recorded(lag):
+    """In slip as the filter gives it; what it holds at rest is what was recorded there."""
+    values = {"inertia": 5.0} | {f"{n}{s}": 2.0 for n in ("coulomb", "viscous") for s in "+-"}
+    model = models.from_parameters(models.coulomb_viscous(), values)
+    behind = models.from_parameters(model.term + SensorFilter(), values | {"filter_time": lag})
+    time = np.arange(4000) / 1000
+    rest = (time > 1.0) & (time < 1.5)
+    there, again = 0.1 * np.sin(3 * np.minimum(time, 1.0)), np.maximum(time - 1.5, 0.0)
+    run = Recording(time, 0 * time, there + 0.05 * (1 - np.cos(3 * again)))
+    acting = np.where(rest, 7.0, np.asarray(predict(model, run)))  # friction holds what pushes
+    seen, keep = acting.copy(), np.exp(-1e-3 / lag)
+    for i in range(1, len(seen)):
+        behind_by = (acting[i] - acting[i - 1]) / 1e-3 * lag
+        seen[i] = acting[i] - behind_by + keep * (seen[i - 1] - acting[i - 1] + behind_by)
+    told = np.asarray(predict(behind, dataclasses.replace(run, force=seen)))
+    slips = ~rest & (time > 0.05) & (np.abs(time - 1.5) > 0.06) & (np.abs(time - 1.0) > 0.06)
+    slips &= np.abs(np.gradient(np.asarray(run.position), time)) > 0.01
+    np.testing.assert_allclose(told[slips], seen[slips], rtol=0, atol=0.02)
+    assert lag < 0.01 or np.abs(acting - seen)[slips].max() > 0.2
 
 
 @pytest.mark.slow

@@ -158,7 +158,7 @@ FILTER = "filterexact"
 def _late(finding: Finding, own: Mapping[str, Attribute]) -> Finding:
     """A delay or a lag as the actuator's attribute, where the joint has one."""
     effect, owner = EFFECTS.get(finding.effect), own[GAIN].owner if GAIN in own else ""
-    if effect is None or not effect.late or not owner.startswith("actuator "):
+    if effect is None or not effect.late or effect.logged or not owner.startswith("actuator "):
         return finding
     what = effect.shift or "dynprm[0]"
     name = f"{owner.replace(' ', '/', 1)}/{what}"

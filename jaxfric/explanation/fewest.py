@@ -31,11 +31,12 @@ def fewest(own: np.ndarray, residual: np.ndarray, block: np.ndarray, enough: flo
     gram, pull = columns.T @ columns, columns.T @ residual
     most = _removed(gram, pull, range(len(used)))
     found: tuple[int, ...] = ()
+    better = found
     parts, taken = np.zeros(len(used)), 0.0
     for count in range(1, min(len(used), MOST_WRONG) + 1):
         if most - taken < enough:
             break
-        better = _best(gram, pull, count, found)
+        better = _best(gram, pull, count, better)
         inverse = np.linalg.pinv(columns[:, better], rcond=RANK)
         other = np.zeros(len(used))
         other[list(better)] = inverse @ residual

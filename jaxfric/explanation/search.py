@@ -35,13 +35,13 @@ def searched(
     if at_once is not None:
         return at_once
     found = aligned(motion, problem, seed, refused, first)
+    # Rows across reversals hold more than a delay or a lag, of which not all may be known.
+    in_slip = found.problem.in_slip or found.problem, found.selection.in_slip or found.selection
     lateness = None
     if any(traits(term).late for term in found.selection.last.terms):
-        # Rows across reversals hold more than a delay or a lag, of which not all may be known.
-        in_slip = found.problem.in_slip or found.problem, found.selection.in_slip or found.selection
         lateness = late(motion, *in_slip)
     sure = lateness is not None
-    lateness = lateness or overlooked(motion, *found, seed)
+    lateness = lateness or overlooked(motion, *in_slip, seed)
     if lateness is None:
         return alone(found)
     findings = with_late_force(found, _put_back(motion, found, lateness, seed, refused), lateness)

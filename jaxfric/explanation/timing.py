@@ -8,7 +8,6 @@ the kernel is wide shows in no column; undoing it does.
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -30,8 +29,6 @@ from .rivals import NO_EVIDENCE
 from .selection import SelectedTerm, Selection
 from .significance import BLOCKS, LEVEL, agreement
 
-Undo = Callable[[Recording, float], Recording]
-
 # Steps, from the first-order estimate, which may be off by its own second order, to times between
 # which the least energy lies; and parabolas from there on, until the time is this well known.
 STRIDE, STRIDES = 1.3, 12
@@ -39,20 +36,20 @@ PARABOLAS, CLOSE = 4, 3e-3
 
 
 class LateForce(NamedTuple):
-    """A force that acts late: its time, s, and how to undo it.
+    """A force that is late: its time, s, and the effect that it is.
 
     `selected`: the term, under its right name; `time_error`: the error of the time by smoothing and
     sampling, s.
     """
 
     time: float
-    undo: Undo
+    effect: Effect
     selected: SelectedTerm
     time_error: float
 
     def undone(self, recording: Recording | Motion) -> Motion:
         """The motion of a recording with its force where it belongs."""
-        return _undone(motion_of(recording), self.undo, self.time)
+        return _undone(motion_of(recording), self.effect, self.time)
 
 
 def late(recording: Motion, problem: Problem, found: Selection) -> LateForce | None:
@@ -86,22 +83,26 @@ def overlooked(
     if any(traits(term).late for term in found.last.terms):
         return None
     undoing = _Undoing(recording, problem, found.last)
-    before = undoing.rest(_as_it_is, 0.0)
+    before = undoing.rest(None, 0.0)
     power, limits = before @ before, problem.evidence.limits
-    tried = []
-    for effect in ways():
-        time = limits.interval
+    tried: list[tuple[Effect, float, np.ndarray]] = []
+    harmful = set[bool]()
+    for effect in (each for each in EFFECTS.values() if each.late):
+        if effect.logged in harmful:
+            continue
+        first, time = len(tried), limits.interval
         while time < limits.duration / BLOCKS:
-            tried.append((effect, time, undoing.rest(effect.undone, time)))
+            tried.append((effect, time, undoing.rest(effect, time)))
             if tried[-1][2] @ tried[-1][2] > power:
                 break
             time *= 2
-        if len(tried) == 1:  # harm at once, and to first order a lag is a delay
-            return None
+        if len(tried) == first + 1:  # harm at once, and to first order a lag is a delay
+            harmful.add(effect.logged)
+    if len(harmful) == 2:
+        return None
     effect, time, rest = min(tried, key=lambda each: each[2] @ each[2])
-    gain, undo = float(1 - rest @ rest / power), effect.undone
-    wide = problem.wide
-    if gain < MOST_LATE or (wide and undoing.gain(undo, time, wide.width) < MOST_LATE):
+    gain, wide = float(1 - rest @ rest / power), problem.wide
+    if gain < MOST_LATE or (wide and undoing.gain(effect, time, wide.width) < MOST_LATE):
         return None
     p_value = agreement(np.stack([before**2 - each[2] ** 2 for each in tried]), problem.block, seed)
     if p_value > LEVEL:
@@ -121,41 +122,41 @@ class _Undoing:
         count = self.motion.recording.num_samples
         self.noise = _of_commands(self.motion.forced(np.random.default_rng(0).normal(size=count)))
         self.hiss = functools.cache(self._hiss)
-        narrow = self.hiss(_as_it_is, 0.0, problem.evidence.width)
+        narrow = self.hiss(None, 0.0, problem.evidence.width)
         self.power = fast(known) ** 2 / narrow  # of the force's noise, in the time domain, N²
 
-    def _hiss(self, undo: Undo, time: float, width: int) -> float:
+    def _hiss(self, effect: Effect | None, time: float, width: int) -> float:
         """What white noise of the force leaves in a row, in parts of its power."""
-        rows = gather(
-            _undone(self.noise, undo, time), width, reversals=self.problem.reversals
-        ).target
+        noise = _undone(self.noise, effect, time)
+        rows = gather(noise, width, reversals=self.problem.reversals).target
         return float(np.mean(rows**2))
 
-    def rest(self, undo: Undo, time: float, width: int | None = None) -> np.ndarray:
-        """What the refitted terms leave once a time is undone, N, `(J,)`.
+    def rest(self, effect: Effect | None, time: float, width: int | None = None) -> np.ndarray:
+        """What the refitted terms leave once the time of an effect is undone, N, `(J,)`.
 
         A lag undone takes noise away, too, which says nothing for it: what there is of noise in the
         rest counts as if it were untouched. What else is in the rest is left by both ways alike.
+        What a filter undone adds counts: of a long one all that is slow would seem to be noise.
         """
         problem, width = self.problem, width or self.problem.evidence.width
-        rows = gather(_undone(self.motion, undo, time), width, problem.delay, problem.reversals)
+        rows = gather(_undone(self.motion, effect, time), width, problem.delay, problem.reversals)
         current = fit(self.terms, with_predictions(rows, self.known), self.betas, 3)
-        before, after = self.hiss(_as_it_is, 0.0, width), self.hiss(undo, time, width)
+        before, after = self.hiss(None, 0.0, width), self.hiss(effect, time, width)
         left = float(np.mean(current.residual**2))
         noisy = min(self.power * after / left, 1.0) if left > 0 else 1.0
-        return current.residual * float(np.sqrt(1 + noisy * (before / after - 1)))
+        return current.residual * float(np.sqrt(1 + noisy * max(before / after - 1, 0.0)))
 
-    def gain(self, undo: Undo, time: float, width: int) -> float:
+    def gain(self, effect: Effect, time: float, width: int) -> float:
         """The part of the energy that undoing a time takes away."""
-        before, after = self.rest(_as_it_is, 0.0, width), self.rest(undo, time, width)
+        before, after = self.rest(None, 0.0, width), self.rest(effect, time, width)
         return float(1 - after @ after / (before @ before))
 
-    def least(self, undo: Undo, guess: float, width: int | None = None) -> tuple[float, float]:
+    def least(self, effect: Effect, guess: float, width: int | None = None) -> tuple[float, float]:
         """The least energy over times, from a guess downhill, and the time there."""
 
         @functools.cache
         def energy(time: float) -> float:
-            rest = self.rest(undo, time, width)
+            rest = self.rest(effect, time, width)
             return float(rest @ rest)
 
         low, best, high = guess / STRIDE, guess, guess * STRIDE
@@ -192,28 +193,29 @@ def _told_apart(undoing: _Undoing, guess: float, selected: SelectedTerm, size: f
     Several lags in a row are neither: both take nearly all of it then, and either may be meant.
     """
     problem = undoing.problem
-    least = {effect.name: undoing.least(effect.undone, guess) for effect in ways()}
+    ways = alike(selected.effect)
+    least = {effect.name: undoing.least(effect, guess) for effect in ways}
     best = EFFECTS[min(least, key=lambda name: least[name][0])]
     energy, time = least.pop(best.name)
     others = {name: 0.5 * size * np.log(left / energy) for name, (left, _) in least.items()}
-    as_it_is = undoing.rest(_as_it_is, 0.0)
+    as_it_is = undoing.rest(None, 0.0)
     score = 0.5 * size * np.log(float(as_it_is @ as_it_is) / energy)
     nearly = max(RIVAL, (1 - NO_EVIDENCE) * score)
     near = (name for name, gap in others.items() if gap < nearly)
     rivals = (*near, *(r for r in selected.rivals if r != best.name and r not in others))
     wide = time
     if problem.wide is not None:
-        wide = undoing.least(best.undone, time, 2 * problem.evidence.width)[1]
+        wide = undoing.least(best, time, 2 * problem.evidence.width)[1]
     # Smoothing errs with the square of the width, so a third of what doubling it changes is left
     # (Richardson 1911); and nobody wrote down when in its period a sample of the force was taken.
     time_error = float(np.hypot((wide - time) / 3, problem.evidence.limits.interval / np.sqrt(12)))
     trial = selected.trial._replace(candidate=_candidate(best))
-    return LateForce(time, best.undone, selected._replace(trial=trial, rivals=rivals), time_error)
+    return LateForce(time, best, selected._replace(trial=trial, rivals=rivals), time_error)
 
 
-def ways() -> list[Effect]:
-    """The effects by which the force acts late as a whole."""
-    return [effect for effect in EFFECTS.values() if effect.late]
+def alike(late: Effect) -> list[Effect]:
+    """The effects that are the same to first order: the force acts late, or is recorded late."""
+    return [each for each in EFFECTS.values() if each.late and each.logged == late.logged]
 
 
 def _candidate(effect: Effect) -> Candidate:
@@ -274,9 +276,8 @@ def _of_commands(motion: Motion) -> Motion:
     return motion._replace(recording=logs[0], padded=logs[1])
 
 
-def _undone(motion: Motion, undo: Undo, time: float) -> Motion:
-    return motion.forced(undo(motion.recording, time).force)
-
-
-def _as_it_is(motion: Recording, _: float) -> Recording:
-    return motion
+def _undone(motion: Motion, effect: Effect | None, time: float) -> Motion:
+    """The motion with the force where it belongs; as it is, for no effect."""
+    if effect is None or effect.undone is None:
+        return motion
+    return motion.forced(effect.undone(motion.recording, time).force)

@@ -281,6 +281,8 @@ def left_out(model: Model, part: Part) -> str:
         if not part.affine:
             return "the other simulator's force: add to it what this text computes"
         return f"the other simulator's {', '.join(part.affine)}: put right there what was found"
+    if effect.logged:
+        return f"{part.name}: the log's alone, and the machine has none of it"
     if effect.late:
         exact = "" if effect.shift else ", to first order"
         time = float(values[part.affine[0]])

@@ -19,7 +19,7 @@ from ..simulators.patching import Patched, folder_of, patched
 from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import AbstractTerm, Sum
-from ..terms.effects import EFFECTS, traits
+from ..terms.effects import EFFECTS, Effect, traits
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback, readback
 from .errors import from_to, miss, reached, worse
@@ -241,12 +241,13 @@ def _put_right(source, joint: str, told: Explanation):
         elif finding.effect == "force_limit" and finding.attribute:
             (limit,) = finding.parameters.values()
             values[finding.attribute] = float("inf"), float(limit.value)
+        elif finding.effect in EFFECTS and EFFECTS[finding.effect].logged:
+            what = finding.effect.replace("_", " ")
+            left.append(f"joint {joint}: the {what} of the force: it is the log's, not the model's")
         elif finding.effect in EFFECTS and EFFECTS[finding.effect].shift:
             _late(model, "delay", "a delay", finding.parameters["delay"], values, left)
         elif finding.effect in EFFECTS and EFFECTS[finding.effect].late:
             _late(model, "dynprm[0]", "a lag", finding.parameters["lag"], values, left)
-        elif finding.effect == "clock":
-            left.append(f"joint {joint}: the clock of the force: it is the log's, not the model's")
     return values, left
 
 
@@ -284,10 +285,14 @@ def _acting(told: Explanation) -> tuple[float, float, float, float]:
     for finding in told.findings:
         if finding.effect == "force_limit":
             limit = float(next(iter(finding.parameters.values())).value)
-        elif finding.effect in EFFECTS and EFFECTS[finding.effect].late:
+        elif finding.effect in EFFECTS and _acts_late(EFFECTS[finding.effect]):
             delay = float(finding.parameters.get("delay", NONE).value)
             lag = float(finding.parameters.get("lag", NONE).value)
     return gain, limit, delay, lag
+
+
+def _acts_late(effect: Effect) -> bool:
+    return effect.late and not effect.logged
 
 
 def _moved(told: Explanation):

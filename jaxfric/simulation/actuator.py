@@ -129,6 +129,8 @@ def parted(model: Model, interval: float | None) -> tuple[Model, Actuator | None
     for term, alpha in pairs:
         if PREDICTED in term.coordinates:
             effect = traits(term)
+            if effect.logged:
+                continue
             if effect.late:
                 times["delay" if effect.shift else "lag"] += alpha[0]
             else:

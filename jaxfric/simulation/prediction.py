@@ -19,6 +19,8 @@ from ..terms import at_other_times
 from ..terms.actuator import PREDICTED, REACTION, carried
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
+from ..terms.effects.late import SensorFilter
+from ..terms.known import KNOWN_FEEDBACK
 from ..terms.presliding import AbstractStates, starts
 
 # Of a long recording so many samples are predicted together, with those on either side.
@@ -36,10 +38,12 @@ def predict(model: Model, recording: Recording) -> Float[Array, " N"]:
     `jax.jit`, `jax.vmap` and `jax.grad`; there the recorded velocity is kept. At v = 0, where
     friction takes any value up to break-away, the value is that of the terms at rest. A
     [`TransportDelay`][jaxfric.terms.TransportDelay] is taken in whole, u(t) = f(t + τ), and not to
-    first order. What a load pushes that is stepped along the motion (`DryCompliance`,
-    `ElasticBacklash`) is smoothed as the motor's acceleration is, which it swings. NaN where a
-    parameter counts that the model has no value for. A model that reads the position takes the
-    integral of the velocity, from zero, where no position is recorded.
+    first order, as are a [`ClockOffset`][jaxfric.terms.ClockOffset] and a
+    [`SensorFilter`][jaxfric.terms.SensorFilter], which holds the recorded force where the axis
+    starts. What a load pushes that is stepped along the motion (`DryCompliance`, `ElasticBacklash`)
+    is smoothed as the motor's acceleration is, which it swings. NaN where a parameter counts that
+    the model has no value for. A model that reads the position takes the integral of the velocity,
+    from zero, where no position is recorded.
     """
     require_model(model, "predict")
     require(recording, "predict")
@@ -180,6 +184,7 @@ def samples_of(delay: float, step: float) -> int:
 def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
     """What [`predict`][] gives, N, `(N,)`, of a recording that is prepared."""
     model, delay = at_once(model)
+    model, lag = unfiltered(model)
     prepared = dataclasses.replace(with_channels(model, motion.recording), units=())
     momentum: Callable[[Recording], Array | np.ndarray] = partial(_momentum_of, model)
     force: Callable[[Recording], Array | np.ndarray] = partial(_force_of, model)
@@ -195,6 +200,8 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
         moved = moved + _smoothing_of_loads(model, motion, driven)
     rate = _rate(moved, prepared, motion.choices[-1], motion.step)
     whole = force(prepared) + rate + lagging
+    if lag is not None:
+        whole = at_other_times(prepared, whole, lambda part: filtered(prepared, part, lag))
     return at_other_times(prepared, whole, lambda part: later(prepared, part, delay))
 
 
@@ -288,10 +295,56 @@ def at_once(model: Model) -> tuple[Model, Float[Array, ""] | None]:
     name = next(filter(None, (traits(term).shift for term in summands(model.term))), None)
     delay = model.force_delay
     if name is not None:
-        late = model.parameters[name]
+        logged = any(traits(term).logged and traits(term).shift for term in summands(model.term))
+        late = -model.parameters[name] if logged else model.parameters[name]
         delay = late if delay is None else delay + late
         model = model.with_parameters({name: 0.0})
     return dataclasses.replace(model, force_delay=None, units=()), delay
+
+
+def unfiltered(model: Model) -> tuple[Model, Float[Array, ""] | None]:
+    """The model without the filter of a force's sensor, and its time constant, s."""
+    if not any(map(_filters, summands(model.term))):
+        return model, None
+    lag = next(alpha[0] for term, alpha in model.pairs() if _filters(term))
+    return model.only(lambda term: not _filters(term)), lag
+
+
+def _filters(term: AbstractTerm) -> bool:
+    return isinstance(term, SensorFilter)
+
+
+def filtered(recording: Recording, signal: Float[Array, " N"], lag) -> Float[Array, " N"]:
+    """A signal behind 1/(1 + T s), exact for straight lines between the samples; `lag`: T, s.
+
+    At rest friction takes any value, so that what the filter holds when the axis starts is what was
+    recorded last; so it is at the start of a segment.
+    """
+    feedback = recording.channels.get(KNOWN_FEEDBACK)
+    seen = recording.force if feedback is None else recording.force - feedback
+    rests = jnp.abs(recording.velocity) <= signals.scales(recording).slowest
+    return _filtered(dataclasses.replace(recording, force=seen, channels={}), signal, rests, lag)
+
+
+@programs.compiled
+def _filtered(recording: Recording, signal, rests, lag):
+    step = jnp.diff(recording.time, prepend=recording.time[:1])
+    last, before = (jnp.concatenate([x[:1], x[:-1]]) for x in (signal, recording.force))
+    begins, linked = starts(recording), (lag > 0) & (step > 0)
+    safe = jnp.where(linked, step, 1.0)
+    keep = jnp.exp(-safe / jnp.where(lag > 0, lag, 1.0))
+    # What is recorded less the signal: a part of it is kept, and a slope adds to it.
+    added = -lag * (signal - last) / safe * (1 - keep)
+    away = jnp.where(jnp.isfinite(before), keep * (before - signal), 0.0)
+    fresh = rests | jnp.concatenate([rests[:1], rests[:-1]])
+    added = jnp.where(fresh, away, added)
+    added = jnp.where(begins & jnp.isfinite(recording.force), recording.force - signal, added)
+
+    def both(first, second):
+        return first[0] * second[0], second[0] * first[1] + second[1]
+
+    pair = jnp.where(fresh | begins | ~linked, 0.0, keep), jnp.where(linked | begins, added, 0.0)
+    return signal + jnp.where(rests, 0.0, jax.lax.associative_scan(both, pair)[1])
 
 
 def later(recording: Recording, signal: Float[Array, " N"], delay) -> Float[Array, " N"]:

@@ -29,7 +29,12 @@ from .effects.end_stop import EndStop as EndStop, LowerEndStop as LowerEndStop
 from .effects.frictional_lag import FrictionalLag as FrictionalLag
 from .effects.gain_asymmetry import GainAsymmetry as GainAsymmetry
 from .effects.gravity_unbalance import GravityUnbalance as GravityUnbalance
-from .effects.late import ActuatorLag as ActuatorLag, TransportDelay as TransportDelay
+from .effects.late import (
+    ActuatorLag as ActuatorLag,
+    ClockOffset as ClockOffset,
+    SensorFilter as SensorFilter,
+    TransportDelay as TransportDelay,
+)
 from .effects.load_dependent_friction import (
     LoadDependentFriction as LoadDependentFriction,
     ReactionFriction as ReactionFriction,

@@ -206,8 +206,9 @@ class Effect:
     - `scatter`: further β of a law whose energy has minima between neighbours of such a grid, so
       many of them, `(G, d)`.
     - `outstanding`: laws that the residual itself suggests.
-    - `undone`: the recording with the force where it belongs, for a force that acts late by a time,
+    - `undone`: the recording with the force where it belongs, for a force that is late by a time,
       s; `shift`: the parameter by which a prediction takes the force later, if by the whole of it.
+    - `logged`: it is in the log alone, and what moves has none of it: a force is recorded late.
 
     How it is told:
 
@@ -251,6 +252,7 @@ class Effect:
     outstanding: Callable[[Residual], Iterator[AbstractTerm]] = _nothing
     undone: Callable[[Recording, float], Recording] | None = None
     shift: str = ""
+    logged: bool = False
     variant: Callable[[Mapping[str, float], Extent], str | None] = _no_variant
     sizes: tuple[str, ...] = ("amplitude",)
     moment: str = ""
@@ -269,7 +271,7 @@ class Effect:
 
     @property
     def late(self) -> bool:
-        """Whether the force acts late as a whole, and can be put back."""
+        """Whether the force acts or is recorded late as a whole, and can be put back."""
         return self.undone is not None
 
     @property

@@ -1,4 +1,4 @@
-"""A force that acts late: a dead time, or a lag."""
+"""A force that acts late, or that is recorded late: a dead time, or a lag."""
 
 import dataclasses
 from typing import ClassVar
@@ -44,6 +44,25 @@ class ActuatorLag(AbstractLate):
     affine: ClassVar = (Parameter("lag", TIME),)
 
 
+class AbstractRecordedLate(AbstractLate):
+    """A force that is recorded late, to first order: f and a time times −df/dt."""
+
+    def impulse(self, sample: Sample):
+        return (-reading(sample, PREDICTED),)
+
+
+class ClockOffset(AbstractRecordedLate):
+    """Recorded force that is τ old: u = f(t − τ) = f − τ df/dt + O(τ²): first order."""
+
+    affine: ClassVar = (Parameter("clock_offset", TIME),)
+
+
+class SensorFilter(AbstractRecordedLate):
+    """Recorded force behind a first-order low pass: u + T du/dt = f, u = f − T df/dt + O(T²)."""
+
+    affine: ClassVar = (Parameter("filter_time", TIME),)
+
+
 FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quarter turn."
 
 
@@ -59,6 +78,26 @@ def lagged(motion: Recording, lag: float) -> Recording:
     force = np.asarray(motion.force)
     through = at_other_times(motion, force, lambda part: _through(motion, np.asarray(part), lag))
     return dataclasses.replace(motion, force=jnp.asarray(through))
+
+
+def recorded_earlier(motion: Recording, delay: float) -> Recording:
+    """The force taken `delay`, s, earlier: what acted when it was recorded."""
+    return earlier(motion, -delay)
+
+
+def unfiltered(motion: Recording, lag: float) -> Recording:
+    """The force u before a low pass, u + T du/dt, by central differences."""
+    time, force, segment = map(np.asarray, (motion.time, motion.force, motion.segment))
+
+    def before(part):
+        found = np.array(part, float)
+        for label in np.unique(segment):
+            own = np.flatnonzero((segment == label) & (np.diff(time, append=np.inf) > 0))
+            if own.size > 1:
+                found[own] += lag * np.gradient(found[own], time[own])
+        return found
+
+    return dataclasses.replace(motion, force=jnp.asarray(at_other_times(motion, force, before)))
 
 
 def _through(motion: Recording, force: np.ndarray, lag: float) -> np.ndarray:
@@ -110,4 +149,44 @@ ACTUATOR_LAG = Effect(
     delays=True,
     leftover=True,
     undone=lagged,
+)
+
+CLOCK = Effect(
+    "clock",
+    "u = f(t − τ)",
+    "actuator",
+    "The recorded force is {clock_offset} late: force and motion are logged with different delays, "
+    "and the machine itself has none of it; log both by one clock, or shift the column",
+    laws=(ClockOffset,),
+    coordinates=("force_rate",),
+    needs=frozenset({"predicted_force"}),
+    confusable_with=("sensor_filter", "frictional_lag", "compliance"),
+    separate_by="Excite faster: a filter takes off the fast parts of a force, another clock none.",
+    positive=True,
+    first_order=True,
+    sharp=True,
+    delays=True,
+    leftover=True,
+    undone=recorded_earlier,
+    shift="clock_offset",
+    logged=True,
+)
+SENSOR_FILTER = Effect(
+    "sensor_filter",
+    "u + T du/dt = f",
+    "actuator",
+    "The recorded force is filtered, by a low pass with a time constant of {filter_time}: of the "
+    "sensor or of the drive's display, and the machine itself has none of it; log it unfiltered",
+    laws=(SensorFilter,),
+    coordinates=("force_rate",),
+    needs=frozenset({"predicted_force"}),
+    confusable_with=("clock", "frictional_lag", "compliance"),
+    separate_by="Excite faster: a filter takes off the fast parts of a force, another clock none.",
+    positive=True,
+    first_order=True,
+    sharp=True,
+    delays=True,
+    leftover=True,
+    undone=unfiltered,
+    logged=True,
 )

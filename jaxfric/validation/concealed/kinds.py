@@ -4,14 +4,14 @@ from collections.abc import Iterable, Mapping
 
 from ...terms.effect import ANY
 from ...terms.effects import EFFECTS
-from . import curves, memories, places, schedule
+from . import curves, memories, others, places, schedule
 from .definitions import DEFINITIONS
 from .nominal import Kind
 from .own import by_law
 
 # Effects with physics of their own in the simulator, written apart from the library's laws.
 PHYSICS: Mapping[str, Kind] = {
-    **curves.KINDS, **places.KINDS, **memories.KINDS, **schedule.KINDS,
+    **curves.KINDS, **places.KINDS, **memories.KINDS, **schedule.KINDS, **others.KINDS,
 }  # fmt: skip
 
 OUTSIDE = ("position_dependent_delay", "hysteretic_spring", "acceleration_dependent_friction")
@@ -24,8 +24,8 @@ def names() -> tuple[str, ...]:
     Those with physics of their own in the simulator, then all others with a law.
     """
     known = [name for name in PHYSICS if name not in OUTSIDE]
-    others = [e.name for e in EFFECTS.values() if e.drawn and e.shapes(ANY)]
-    return (*known, *(name for name in others if name not in PHYSICS))
+    by_their_law = [e.name for e in EFFECTS.values() if e.drawn and e.shapes(ANY)]
+    return (*known, *(name for name in by_their_law if name not in PHYSICS))
 
 
 def kind(name: str, by: str = "") -> Kind:

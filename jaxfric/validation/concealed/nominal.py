@@ -89,8 +89,8 @@ class Kind(NamedTuple):
     the recorded position, velocity and time alone; `added`, to the force of a machine that moves as
     it would without. `over(truth, nominal, run)`: what acts because of the time; `unrepeated`, in
     each run at moments of its own; `channels(truth, plan, run, clock)` that record it. With
-    `logged(truth, clock, signal)`, it is the logger that makes of the position what this says, and
-    the axis feels nothing.
+    `logged(truth, clock, signal)`, it is the logger that makes of the position what this says, with
+    `recorded(truth, clock, signal)` of the force, and the axis feels nothing.
     """
 
     draw: Callable[[Generator, Nominal, float], Truth]
@@ -115,6 +115,7 @@ class Kind(NamedTuple):
     over: Callable[[Truth, Nominal, int], Columns] | None = None
     channels: Callable[[Truth, Plan, int, np.ndarray], dict[str, np.ndarray]] | None = None
     logged: Callable[[Truth, np.ndarray, np.ndarray], np.ndarray] | None = None
+    recorded: Callable[[Truth, np.ndarray, np.ndarray], np.ndarray] | None = None
 
     def measure(self, truth: Truth, nominal: Nominal) -> float:
         """The size: root mean square of the force in parts of the Coulomb level."""

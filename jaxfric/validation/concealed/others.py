@@ -93,6 +93,19 @@ def _filtered(truth, clock, signal):
 TIMESTAMP = memories.DELAY._replace(physics=no_physics, logged=_old)
 LOGGED_LAG = memories.LAG._replace(physics=no_physics, logged=_filtered)
 
+
+def _recorded(late: Kind, after) -> Kind:
+    """Of a force that acts late: the logger's force is that late instead."""
+    return late._replace(
+        force=lambda truth, n: -late.force(truth, n), physics=no_physics, recorded=after
+    )
+
+
+KINDS = {
+    "clock": _recorded(memories.DELAY, _old),
+    "sensor_filter": _recorded(memories.LAG, _filtered),
+}
+
 # Friction
 
 _LUGRE = with_physics(

@@ -144,7 +144,9 @@ def _hide(machine: Machine, clock, true: physics.Motion, load, run):
     Two such effects at once share it: each is given half.
     """
     kinds = {name: _kind(machine, name) for name in machine.effects}
-    names = [name for name, own in kinds.items() if not own.added and own.logged is None]
+    names = [
+        name for name, own in kinds.items() if not own.added and not (own.logged or own.recorded)
+    ]
     n = _driven(machine, clock, true)
     known = {name: _known(name, machine, n, run) for name in names if kinds[name].follows}
     inside = [known[name] for name in names if kinds[name].inside]
@@ -167,13 +169,18 @@ def _added(machine: Machine, clock, true: physics.Motion) -> dict[str, np.ndarra
 
 
 def _logged(machine: Machine, clock, true: physics.Motion):
-    """The run with the position as the logger has it, and the force of each effect that is its.
+    """The run with position and force as the logger has them, and the force of each effect that is
+    its.
 
     What the logged position needs is the force as late as it is.
     """
     hidden = {}
     for name, truth in machine.truth.items():
-        logged = _kind(machine, name).logged
+        logged, recorded = _kind(machine, name).logged, _kind(machine, name).recorded
+        if recorded is not None:
+            force = recorded(truth, clock, true.force)
+            hidden[name] = force - true.force
+            true = true._replace(force=force)
         if logged is not None:
             hidden[name] = true.force - logged(truth, clock, true.force)
             true = true._replace(counted=logged(truth, clock, true.counted))
