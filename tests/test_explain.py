@@ -986,6 +986,30 @@ def test_where_a_finding_acts_is_said_even_if_no_curve_shows_it(healthy):
     assert structure.with_findings(places, found.findings, base) == places
 
 
+def test_what_has_no_name_is_located_where_it_is_strongest():
+    """The contract's `where` is never empty of what is unexplained, and says how little it is."""
+    curve = np.array([0.0, 1.0]), np.array([0.2, -0.1])
+    most = structure.Structure("time", 0.02, 0.3, 0.4, np.nan, curve)
+    shown = structure.Shown([], [most])
+    (place,) = structure.strongest(shown, {"position": "m"}, frozenset())
+    assert place["coordinate"] == "time" and place["p_value"] == 0.4
+    assert place["detail"] == "strongest at 0 s (little of it, and no more than chance makes)"
+
+
+def test_a_change_has_rows_before_and_after(healthy):
+    """One before the first row is no change of anything: gravity was called a payload by it."""
+    posed = problem.problem_of(healthy[0], models.named("gaussian"))
+    for moment, changes in ((-1.0, False), (8.0, True), (TIME[-1] - 0.01, False)):
+        term = terms.PayloadChange(step_time=moment)
+        effect = EFFECTS["payload_change"]
+        found = types.SimpleNamespace(
+            effect=effect,
+            trial=types.SimpleNamespace(candidate=types.SimpleNamespace(term=term)),
+            betas=(np.zeros(0), np.array([moment])),
+        )
+        assert contest._changed(found, posed.evidence) == changes
+
+
 def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
     seen = Estimate(np.float64(-38.9), np.float64(1.6), "N·s/m")
     hidden = Estimate(np.float64(0.0369), np.float64(np.inf), "N")

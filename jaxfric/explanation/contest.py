@@ -206,7 +206,7 @@ def _finals(
         return assessed(found)
 
     def assessed(found: Finalist | None) -> Finalist | None:
-        if found is None or not _sensible(found.trial, found.alpha):
+        if found is None or not (_sensible(found.trial, found.alpha) and _changed(found, seen)):
             return None
         trial, gain = found.trial, 1 - found.energy / current.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
@@ -235,6 +235,21 @@ def _finals(
 def _sensible(trial: Trial, alpha: np.ndarray) -> bool:
     """Whether magnitudes are positive."""
     return not (trial.effect.positive and np.any(alpha < 0))
+
+
+# Of the rows at either end, as of the record: one level would rest on too few samples.
+FIRST_ROWS = 0.02
+
+
+def _changed(found: Finalist, seen: Evidence) -> bool:
+    """Whether there are rows before and after a change: else it is no change."""
+    effect, term = found.effect, found.trial.candidate.term
+    if not effect.moment or effect.lasting:
+        return True
+    names = [p.name for p in term.nonlinear]
+    moment = found.betas[-1][names.index(effect.moment)]
+    before = np.mean(np.asarray(seen.motion.time)[seen.centre] < moment)
+    return bool(FIRST_ROWS <= before <= 1 - FIRST_ROWS)
 
 
 def _overshadowed(trial: Trial, alpha: np.ndarray) -> bool:

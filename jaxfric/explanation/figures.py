@@ -14,6 +14,7 @@ from ..data.recording import Recording
 from ..models import Model
 from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
 from ..simulation.prediction import Prepared
+from .counts import answered
 
 # Parts of a record that are compared: none shares more than its ends with another.
 PARTS = 16
@@ -136,7 +137,8 @@ class Figures:
     def floor(self, model: Model, lag: float) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
 
-        What is so far apart differs by noise and by what changes faster (von Neumann 1941).
+        What is so far apart differs by noise and by what changes faster (von Neumann 1941). With
+        what the loop makes of the encoder's counts, which comes in bursts.
         """
         recording = self._recordings["here"]
         moving, force = self._samples("here", delay_of(model))
@@ -155,4 +157,6 @@ class Figures:
         noise = float(np.median(apart, overwrite_input=True)) / 0.6745 / np.sqrt(2)
         total = power(force, moving)
         alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
-        return min(alone, relative(rest, force, moving))  # noise is no more than all of it
+        whole = relative(rest, force, moving)
+        counted = whole * np.sqrt(answered(rest, moving, self._motion("here")))
+        return min(float(np.hypot(alone, counted)), whole)  # noise is no more than all of it

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from ..terms.effect import Extent
+from ..identification.uncertainty import Estimate
+from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from . import verification
@@ -41,6 +42,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         if effect.moment:
             parameters = dated(parameters, effect.moment, evidence)
             parameters = spanning(parameters, findings, number)
+        parameters = parameters | _dates(effect, findings, number)
         share, held = _shares(findings, first, number)
         alone.append(share)
         if twins := _twins(findings, number):
@@ -141,6 +143,17 @@ def _twins(findings: Findings, number: int) -> list[int]:
     """
     names = [selected.effect.name for selected in findings.selection.selected]
     return [n for n in reversed(range(number + 1, len(names))) if names[n] == names[number]]
+
+
+def _dates(effect: Effect, findings: Findings, number: int) -> dict[str, Estimate]:
+    """The times that a term holds as given numbers: anywhere between two rows."""
+    problem, selection = findings.examined_in(number)
+    term = selection.last.terms[selection.term_index(number)]
+    error = problem.evidence.reach / problem.evidence.half / np.sqrt(12)
+    return {
+        name: Estimate(np.float64(at), np.float64(error), "s")
+        for name, at in effect.dates(term).items()
+    }
 
 
 def _without(findings: Findings, numbers: list[int]) -> Findings:

@@ -1,7 +1,7 @@
 """Where the baseline and the findings leave structure in the residual, and what of it counts."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,20 @@ from .problem import PERSISTS, Problem
 from .regression import Fit, fast, fit
 from .significance import LEVEL
 
+# Part of what is left, below which a coordinate is not where it is.
+HALF = 0.5
+
+
+class Shown(NamedTuple):
+    """Where a residual has structure that counts, and where it has most, counting or not."""
+
+    counts: list[Structure]
+    most: list[Structure]
+
 
 def before_and_after(
     better: Improved, wrong: Mismatch | None, seed: int
-) -> tuple[list[Structure], list[Structure]]:
+) -> tuple[Shown, list[Structure]]:
     """Where the baseline's residual has structure, and where that of the findings has."""
     problem = better.findings.problem
     undelayed, selection = better.findings.undelayed
@@ -33,10 +43,10 @@ def before_and_after(
         remainder = OF_BASE**0.5 * mismatch  # of laws that have not quite the shape of their effect
         fits.append((selection.last, undelayed, LATER_SHARE, max(LINEARITY * force, remainder)))
     before, *after = threads.each(lambda one: _shown(*one, seed), fits)
-    return before, after[0] if after else []
+    return before, after[0].counts if after else []
 
 
-def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int) -> list[Structure]:
+def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int) -> Shown:
     """The structure of a fit's residual that a wider kernel and the held-out recording show too.
 
     From so large a `share` of what is left, and of that `size`, N.
@@ -44,7 +54,7 @@ def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int)
     located = locate(with_predictions(problem.evidence, current), current, seed)
     found = significant(located, share, size)
     found = through_wide(found, current, problem.wide, seed)
-    return lasting(found, current, problem)
+    return Shown(lasting(found, current, problem), located[:1])
 
 
 def significant(found: list[Structure], share: float, size: float) -> list[Structure]:
@@ -98,6 +108,19 @@ def documents(
     `shared`: coordinates over which the other recording leaves structure as well.
     """
     return with_findings([document(s, units, shared) for s in found], findings, first)
+
+
+def strongest(
+    found: Shown, units: Mapping[str, str], shared: frozenset[str]
+) -> list[dict[str, Any]]:
+    """The document's `where` of what has no name and no structure that counts."""
+    said = []
+    for each in found.most:
+        place = document(each, units, shared)
+        weak = "little of it, and " if each.share < HALF else ""
+        chance = "no more than chance makes" if each.p_value > LEVEL else "the most that there is"
+        said.append(place | {"detail": f"{place['detail']} ({weak}{chance})".lstrip()})
+    return said
 
 
 def with_findings(

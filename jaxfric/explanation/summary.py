@@ -62,7 +62,7 @@ def summarise(
     apart = _elsewhere(errors)
     remarks = [*remarks, *apart]
     new, later = (
-        [s for s in some if s.coordinate not in known.structured] for some in (before, after)
+        [s for s in some if s.coordinate not in known.structured] for some in (before.counts, after)
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(selection, filtered)
@@ -73,9 +73,14 @@ def summarise(
     # In another recording that is compared with, what has no name may be as well.
     seen = better.dropped if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
+    verdict = verdict_of(findings, new, later, much, standing, remarks, seen)
+    where = structure.documents(before.counts, findings, better.first, units, known.structured)
+    if verdict == "unexplained" and not where:
+        where = structure.strongest(before, units, known.structured)
+    shown = curves(before.counts[:6], better, models)
     return Explanation(
-        verdict=verdict_of(findings, new, later, much, standing, remarks, seen),
-        where=structure.documents(before, findings, better.first, units, known.structured),
+        verdict=verdict,
+        where=where,
         findings=findings,
         not_confirmed=refuted,
         fit=errors,
@@ -85,7 +90,7 @@ def summarise(
         baseline_name=known.name,
         baseline_parameters=values,
         recording=facts(recording),
-        curves=curves(before[:6], better, models) | {"findings": [each for _, each in drawn]},
+        curves=shown | {"findings": [each for _, each in drawn]},
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if problem.held is None else holdout_model(better.findings),
     )

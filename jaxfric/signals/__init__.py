@@ -43,6 +43,7 @@ from .motion import (
 from .noise import (
     COLOURED as COLOURED,
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
+    count_of as count_of,
     counted_noise as counted_noise,
     white_noise as white_noise,
 )

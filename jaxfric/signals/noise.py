@@ -75,6 +75,15 @@ def _rounding(signal: np.ndarray, seen: float) -> float:
     `seen`: the noise by differences. Signals whose steps are multiples of one by construction
     (a ramp of the set-point) have much less of it than counts of that size would make.
     """
+    count = count_of(signal)
+    if not count or seen < 0.3 * count / np.sqrt(12):
+        return 0.0
+    lasting = np.median(np.diff(np.flatnonzero(np.diff(signal))))
+    return count * float(np.sqrt(lasting / 12))
+
+
+def count_of(signal: np.ndarray) -> float:
+    """The step that all changes of a signal, `(N,)`, are multiples of; zero where there is none."""
     changes = np.flatnonzero(np.diff(signal))
     if len(changes) < SHORT:
         return 0.0
@@ -85,6 +94,4 @@ def _rounding(signal: np.ndarray, seen: float) -> float:
     # Of uncounted steps one in a hundred is this near a whole number of counts by chance.
     off = np.abs(moved / count - np.rint(moved / count))
     exact = np.finfo(float).eps * np.max(np.abs(signal)) < 1e-4 * count
-    if not exact or seen < 0.3 * count / np.sqrt(12) or np.quantile(off, 0.9) > 5e-3:
-        return 0.0
-    return count * float(np.sqrt(np.median(np.diff(changes)) / 12))
+    return count if exact and np.quantile(off, 0.9) <= 5e-3 else 0.0

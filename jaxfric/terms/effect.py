@@ -154,6 +154,10 @@ def _none_recorded(recording: Recording) -> tuple[AbstractTerm, ...]:
     return ()
 
 
+def _no_dates(term: AbstractTerm) -> dict[str, float]:
+    return {}
+
+
 def _no_variant(values: Mapping[str, float], extent: Extent) -> None:
     return None
 
@@ -215,7 +219,7 @@ class Effect:
     - `sentence`: with parameters in braces; `variant`: another sentence where the name promises
       more than the values hold. `sizes`: parameters of which only the most is known where other
       terms could stand in for all of it. `moment`: the parameter that dates it; `lasting`: that by
-      which it is over again.
+      which it is over again. `dates`: times, s, that a term holds as given numbers, by name.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -257,6 +261,7 @@ class Effect:
     sizes: tuple[str, ...] = ("amplitude",)
     moment: str = ""
     lasting: str = ""
+    dates: Callable[[Any], dict[str, float]] = _no_dates
     drawn: bool = True
 
     def __post_init__(self) -> None:

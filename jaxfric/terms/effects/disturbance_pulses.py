@@ -1,6 +1,6 @@
 """Isolated pushes, whose places the residual itself has to say."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import comb
 from typing import ClassVar
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from ...units import FORCE
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect, Residual
+from ..effect import Effect, Extent, Residual
 from ..sample import Parameter, Sample
 from ..text import TURN, literal, signed
 
@@ -138,6 +138,26 @@ def _summit(time, height, peak) -> float:
     return float(time[peak] + share * 0.5 * (time[peak + 1] - time[peak - 1]))
 
 
+def _dates(term: DisturbancePulses) -> dict[str, float]:
+    return {f"pulse_{i + 1}_time": at for i, at in enumerate(term.times)}
+
+
+# More in a row nobody reads.
+NAMED = 4
+
+
+def listed(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence with the largest pushes and their times, in the order of time."""
+    sizes = {n: abs(v) for n, v in values.items() if f"{n}_time" in values}
+    if not sizes:
+        return None
+    largest = sorted(sizes, key=lambda name: -sizes[name])[:NAMED]
+    largest = sorted(largest, key=lambda name: values[f"{name}_time"])
+    said = ", ".join(f"{{{name}}} at t = {{{name}_time}}" for name in largest)
+    others = f", and {len(sizes) - NAMED} smaller" if len(sizes) > NAMED else ""
+    return f"Isolated pushes at single times: {said}{others}"
+
+
 DISTURBANCE_PULSES = Effect(
     "disturbance_pulses",
     "Σ A_i pulse(t − t_i)",
@@ -152,4 +172,6 @@ DISTURBANCE_PULSES = Effect(
     leftover=True,
     isolated=True,
     outstanding=pulses,
+    variant=listed,
+    dates=_dates,
 )
