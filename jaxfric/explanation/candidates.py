@@ -12,8 +12,9 @@ from ..data.recording import Recording
 from ..terms import KNOWN_FORCE
 from ..terms.actuator import REACTION
 from ..terms.base import AbstractTerm, leaves
-from ..terms.effect import REPEATED, Effect, View, inside
+from ..terms.effect import Effect, View, inside
 from ..terms.effects import EFFECTS
+from ..terms.effects.gravity_unbalance import STROKES
 from ..units import TURNS
 from .evidence import Evidence
 from .nodes import NODES
@@ -186,9 +187,9 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     stroke = float(evidence.limits.high - evidence.limits.low)
 
     def shows(term: AbstractTerm) -> bool:
-        """Whether a wave of a given period repeats within the stroke: else it is a spring."""
+        """Whether a wave of a given period is told from a parabola within the stroke."""
         low, high = (0.0, 0.0) if term.nonlinear else term.extent({}).get("position", (0.0, 0.0))
-        return REPEATED * (high - low) <= stroke
+        return high - low <= STROKES * stroke
 
     found: list[Candidate] = []
     for effect in EFFECTS.values():

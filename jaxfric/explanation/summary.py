@@ -25,7 +25,7 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
-from .wording import ELSEWHERE
+from .wording import CONSTANT_APART, ELSEWHERE, constant_apart
 
 
 def summarise(
@@ -66,8 +66,11 @@ def summarise(
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(selection, filtered)
-    # Values that are known in both recordings and differ: no one model holds for both.
-    missing |= bool(apart and errors.get("holdout_values"))
+    # Values that are known in both recordings and differ: no one model holds for both. Where a load
+    # of time alone was found, another constant is the same load.
+    of_time = any(EFFECTS[f.effect].coordinates == ("time",) for f in effects)
+    if not (of_time and constant_apart(errors)):
+        missing |= bool(apart and errors.get("holdout_values"))
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     # In another recording that is compared with, what has no name may be as well.
@@ -161,9 +164,15 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
         return []
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "
-        f"{refitted:.0%} where the model is fitted to it: it is of another axis, in other units or "
-        "of another sign, or this recording does not determine the values that hold there."
+        f"{refitted:.0%} where the model is fitted to it: "
     )
+    if constant := constant_apart(errors):
+        text += f"a constant force of {constant} more acts there. {CONSTANT_APART}"
+    else:
+        text += (
+            "it is of another axis, in other units or of another sign, or this recording does not "
+            "determine the values that hold there."
+        )
     return [Remark("holdout_differs", text, False)]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..checks import LEFT
 from ..terms.effects import EFFECTS
-from .fewest import SHAPE
+from .fewest import SHAPE, SURE
 from .finding import Finding
 
 VERDICTS = {
@@ -150,6 +150,8 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
         f"But through the search's filter {through} of the held-out force is left, and "
         f"{refitted:.2%} where the model is fitted to it: "
     )
+    if constant := constant_apart(fit):
+        return [f"{text}there a constant force of {constant} more acts. {CONSTANT_APART}"]
     if values := fit.get("holdout_values"):
         there = ", ".join(_differs(name, **value) for name, value in values.items())
         return [
@@ -160,6 +162,34 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
         f"{text}this recording does not determine the values that hold there. Identify on one that "
         "moves like both."
     ]
+
+
+CONSTANT_APART = "A weight, a tilt or a zero of the sensor changes so, and a load that wanders."
+
+
+def constant_apart(fit: Mapping[str, Any]) -> str | None:
+    """The constant force by which the held-out recording alone differs, in words; `None` where it
+    differs otherwise.
+
+    It adds to the Coulomb level of one direction what it takes off the other's.
+    """
+    values = fit.get("holdout_values") or {}
+    if set(values) == {"offset"}:
+        (one,) = values.values()
+        change, error = one["there"] - one["here"], one["standard_error"]
+    elif set(values) == {"coulomb+", "coulomb-"}:
+        both = values["coulomb+"], values["coulomb-"]
+        (rise, fall), errors = zip(
+            *((v["there"] - v["here"], v["standard_error"]) for v in both), strict=True
+        )
+        if abs(rise + fall) > SURE * math.hypot(*errors):
+            return None
+        change, error = 0.5 * (rise - fall), 0.5 * math.hypot(*errors)
+        one = both[0]
+    else:
+        return None
+    digits = max(0, 1 - math.floor(math.log10(2 * error)))
+    return f"{change:.{digits}f} {one['unit']}"
 
 
 # More than half of a mismatch's size is most of it; so it is not what was found here, of which less

@@ -12,14 +12,16 @@ from ..effect import REPEATED, Effect, Extent, slowly
 from ..position import POSITION_ONLY, Gravity, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
 
+# Of so many strokes a sine spans ±π/8 about its middle and differs from a parabola by
+# (π/8)³/6 = 1 %: a longer period can no longer be told.
+STROKES = 8
+
 
 def _long_bounds(scales):
-    """From the longest period that repeats within the stroke, [`REPEATED`][], to eight strokes.
-
-    There the sine spans ±π/8 about its middle and differs from a parabola by (π/8)³/6 = 1 %: a
-    longer period can no longer be told.
+    """From the longest period that repeats within the stroke, [`REPEATED`][], to the longest one
+    that can be told.
     """
-    return stroke(scales) / REPEATED, 8 * stroke(scales)
+    return stroke(scales) / REPEATED, STROKES * stroke(scales)
 
 
 # Hardly more than a cycle: what is told apart are the curvatures of its pieces, not their phases.
