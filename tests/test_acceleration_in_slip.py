@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import jaxfric as jf
 from jaxfric import signals
@@ -29,6 +30,7 @@ def found(log):
     return np.asarray(slope).reshape(STRETCHES, -1), np.asarray(unsure).reshape(STRETCHES, -1)
 
 
+@pytest.mark.slow
 def test_an_answer_of_few_samples_is_followed_and_what_is_left_is_unsure():
     log, exact = strokes(2.0)
     slope, unsure = found(log)

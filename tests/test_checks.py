@@ -104,6 +104,7 @@ def test_a_scale_a_little_off_is_told_and_is_in_the_intervals(factor):
     assert found["coulomb+"].standard_error < 1.1 * true["coulomb+"].standard_error
 
 
+@pytest.mark.slow
 @given(tau=st.floats(0.0, 0.03), seed=st.integers(0, 5))
 @settings(max_examples=8, deadline=None)
 def test_a_filter_is_no_scale(tau, seed):
@@ -323,6 +324,7 @@ def test_spikes_are_no_overflow_however_many():
     assert "force_wraps" not in names(changed(sound, force=force))
 
 
+@pytest.mark.slow
 def test_a_coefficient_of_either_sign_is_not_called_negative():
     assert [
         n for n in ("inertia", "coulomb+", "viscous_2-", "coulomb_2") if not checks.passive(n)

@@ -168,6 +168,7 @@ def test_the_slow_motor_and_the_ramps_of_the_servo_have_none(data_folder):
     assert not servo.points and len(servo.not_evaluated) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 def test_of_one_speed_the_mean_force_is_told(noise):
     rng, t = np.random.default_rng(0), np.arange(4000) / 1000

@@ -32,6 +32,7 @@ def model():
     return jf.identify(term, log(0.2, lambda x: STIFFNESS * x)).model
 
 
+@pytest.mark.slow
 def test_a_motion_on_which_two_effects_differ_decides(model):
     spring = decide(model, "spring", ("hardening_spring",), log(0.2, lambda x: STIFFNESS * x, 1))
     assert spring.effect == "spring" and spring.decided

@@ -30,6 +30,7 @@ def found(axis):
     return design(axis, LIMITS, noise=0.5)
 
 
+@pytest.mark.slow
 def test_the_limits_are_kept_and_one_is_reached(found):
     used = [
         float(jnp.max(jnp.abs(getattr(found.motion, name)))) / getattr(LIMITS, name)

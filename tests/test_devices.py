@@ -127,6 +127,7 @@ def test_a_velocity_is_smoothed_with_the_width_that_suits_its_row():
     assert float(jnp.max(jnp.abs(both[0] - both[1]))) > 1e-3
 
 
+@pytest.mark.slow
 def test_an_accelerator_takes_all_rows_at_once_and_says_the_same(monkeypatch):
     logs = jf.stack(recordings()[:3])
     alone = jf.identify("coulomb-viscous", logs)

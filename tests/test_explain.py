@@ -910,6 +910,7 @@ def test_a_push_is_alone_and_seen_from_begin_to_end():
     assert found((0.02, 1), (12.0, -1), (19.98, 1)) == pytest.approx([12.0], abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("periods", [0.7, 1.4, 1.9])
 def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):
     run = healthy[0]
@@ -1070,6 +1071,7 @@ def test_what_is_wrong_with_both_recordings_is_said_once():
     assert texts == [late[0].text, "On the held-out recording: The force is clipped at 3 N."]
 
 
+@pytest.mark.slow
 def test_what_the_held_out_recording_does_not_reach_is_neither_confirmed_nor_refuted(healthy):
     recording, holdout = healthy
     place = 0.5 * min(float(np.max(each.position)) for each in healthy)
@@ -1478,6 +1480,7 @@ def test_one_effect_stands_for_several_wrong_values_where_it_says_as_much(health
     assert float(one.selection.last.alphas[-1][0]) == pytest.approx(60.0, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", ["forwards", "backwards", "both"])
 def test_friction_of_one_direction_is_no_wrong_friction_and_a_constant_force(healthy, side):
     """Half the difference of the directions alone is, in slip, exactly a constant force."""

@@ -27,6 +27,7 @@ def with_friction(recording, more):
     return planted(recording, terms.Coulomb(), (more,))
 
 
+@pytest.mark.slow
 def test_more_coulomb_friction_is_told_with_its_change(healthy):
     found = explain(with_friction(healthy[1], 2.0), Earlier(healthy[0]))
     assert found.verdict == "explained" and [f.effect for f in found.findings] == [

@@ -101,6 +101,7 @@ def stationary(velocity, force, weight, theta):
     return inverse @ (first * weight[:, None]).T, inverse @ (first * left[:, None]).T
 
 
+@pytest.mark.slow
 def test_the_bump_against_the_implicit_function_theorem(data, gaussian):
     """The same derivative from all four normal equations of a direction, written by hand."""
     term = bumped()

@@ -299,6 +299,7 @@ def off(found, known=None):
     return np.abs(np.array(misses) / np.array(halves))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("projection", [None, jf.WeakForm(16)])
 def test_a_force_that_is_held_is_aligned(projection):
     def error(found):
@@ -319,6 +320,7 @@ def test_a_force_that_is_held_is_aligned(projection):
     assert force_error(found.model, run) == pytest.approx(noise, rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_is_off_by_a_twentieth_for_a_held_force_is_told():
     run = held(100.0)
     (remark,) = jf.identify("coulomb-viscous", run).remarks
@@ -341,6 +343,7 @@ def test_rows_of_a_batch_are_aligned_each_by_itself():
     np.testing.assert_allclose(found.model.alpha[0], alone.model.alpha, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_bump_holds_what_a_held_force_makes_of_it():
     """Closed windows know it by slow samples beside the jumps, where half a sample counts."""
     known = HELD | {"stribeck_force+": 8.0, "stribeck_force-": 6.0}
@@ -435,6 +438,7 @@ def unusable():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [True, False])
 def test_what_is_unusable_stays_in_its_row_without_a_word_of_numpy(velocity):
     logs = [recording(machine("coulomb-viscous"), seconds=2.0, noise=0.1), *unusable().values()]
@@ -533,6 +537,7 @@ def test_a_velocity_from_the_position_takes_nothing_off_a_bump_in_silence(monkey
     assert off(jf.identify("gaussian", run), SHARP).max() > 2
 
 
+@pytest.mark.slow
 def test_single_precision_converges_as_far_as_its_cost_can_tell():
     with jax.enable_x64(False):
         found = jf.identify(
@@ -558,6 +563,7 @@ def stopping(fast_stops: bool) -> jf.Recording:
     return jf.Recording(time[:last], force[:last], velocity=speed[:last])
 
 
+@pytest.mark.slow
 def test_windows_without_the_only_fast_move_of_a_direction_give_way_to_the_weak_form():
     whole = jf.identify(jf.models.coulomb_viscous(), stopping(True))
     assert not whole.weak and float(whole.covered) > 0.9
@@ -572,6 +578,7 @@ def test_windows_without_the_only_fast_move_of_a_direction_give_way_to_the_weak_
     assert float(narrow.covered) < 0.3
 
 
+@pytest.mark.slow
 def test_friction_that_still_falls_at_the_fastest_speed_singles_no_bump_out():
     """The Stribeck velocity lies beyond the bounds, where another shape takes its place."""
     time = np.arange(0.0, 12.0, 1e-3)

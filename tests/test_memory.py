@@ -70,6 +70,7 @@ def broken(recording):
     return dataclasses.replace(recording, mask=mask, segment=segment, num_segments=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", [None, 0.0123])
 @pytest.mark.parametrize("ripple", [0.0, 1e-3])
 def test_force_and_force_error_in_pieces_are_those_of_the_whole(

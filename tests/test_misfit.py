@@ -59,6 +59,7 @@ def missed(found):
     return np.asarray(found.warnings)[:, at : at + 2]
 
 
+@pytest.mark.slow
 def test_a_law_that_is_curved_otherwise_is_told_and_a_right_one_is_not():
     wrong = [machine(f, s) for s, f in enumerate((quadratic, stribeck, thinning))]
     right = [machine(viscous, s, hum=0.5 * (s % 2)) for s in range(8)]
@@ -75,6 +76,7 @@ def test_a_law_that_is_curved_otherwise_is_told_and_a_right_one_is_not():
     assert "curve missed in row 0, 1, 2, 3" in str(found).replace("rows", "row")
 
 
+@pytest.mark.slow
 def test_a_drag_beside_a_bump_is_told_of_the_bump_s_model_alone():
     rows = jf.stack([machine(both, noise=0.3), *(machine(stribeck, s) for s in range(4))])
     force = missed(jf.identify("gaussian", rows))[:, 0]

@@ -102,6 +102,7 @@ def test_the_command_prints_the_same_figure_and_writes_what_it_is_made_of(
     assert np.linalg.norm(left) / np.linalg.norm(force[moving]) == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_findings_that_make_the_saved_model_worse_are_neither_named_nor_saved(healthy, monkeypatch):
     """The one without which the recording's error is least goes first, then the next."""
     run = planted(healthy[0], *CASES["cogging"])
@@ -584,6 +585,7 @@ def after_a_change(moment: float, seed: int) -> Recording:
     return Recording(time=time, force=force, position=position, velocity=velocity)
 
 
+@pytest.mark.slow
 def test_a_recording_made_after_a_change_confirms_it():
     found = explain(after_a_change(9.0, 1), holdout=after_a_change(-1.0, 2))
     never_worse(found)

@@ -60,6 +60,7 @@ def followed(seconds, model="lorentzian", **how):
     return follower, [c for c in changes if c]
 
 
+@pytest.mark.slow
 def test_the_parameters_are_those_of_the_axis_without_its_mass():
     state, news = run(online.start(1e-3, 0.2), samples(60, noise=0.0))
     assert list(state.strokes) == [29, 30] and int(np.sum(news.closed)) == 59
@@ -78,6 +79,7 @@ def log_of(seconds, **how):
     return jf.Recording(t, u, position=x, velocity=v)
 
 
+@pytest.mark.slow
 @given(
     speeds=st.lists(st.floats(1e-3, 3.9), min_size=1, max_size=20),
     nodes=st.integers(4, 33),

@@ -232,6 +232,7 @@ def test_the_minimiser_is_the_root_of_the_derivative(name, noise, points):
         assert abs(beta - root) <= 1e-10, (beta, root, beta - root)
 
 
+@pytest.mark.slow
 def test_a_minimum_on_the_border_is_reported_there():
     friction, bare, rows, *_ = problem("gaussian", 0.02)
     for low, high, wanted in ((0.05, 0.1, 0.05), (0.002, 0.01, 0.01)):

@@ -224,6 +224,7 @@ def bent(seed, begin, distance=1e-3):
     return Recording(time, force + rng.normal(0, 0.05, time.size), place)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begin", [1.0, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_what_a_machine_remembers_from_before_the_record_has_no_name(begin):
     found = explain(bent(1, begin), "coulomb-viscous", bent(2, 1.0))

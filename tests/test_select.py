@@ -34,6 +34,7 @@ def machine(kind, seed, slow=True):
     return jf.Recording(t, force, position=x, velocity=v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_right_shape_is_chosen(kind):
     """Of eight machines of each kind all but one at most: 90 % of all."""

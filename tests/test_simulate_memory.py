@@ -138,6 +138,7 @@ def test_it_does_so_in_single_precision(case):
     assert of_force < 0.02 and of_effect < 1 / 8
 
 
+@pytest.mark.slow
 def test_a_load_that_swings_faster_than_the_acceleration_is_known_is_smoothed_with_it(monkeypatch):
     model, time = dry(110.0, 0.05, 6.0), np.arange(6000) * 1e-3
     place = 0.05 * np.sin(4.4 * time) + 0.02 * np.sin(12 * time + 1)
@@ -149,6 +150,7 @@ def test_a_load_that_swings_faster_than_the_acceleration_is_known_is_smoothed_wi
     assert error < 0.95 * force_error(model, seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["dry", "flanks"])
 def test_a_prediction_with_a_load_differentiates_by_the_model(case):
     model, time = CASES[case], np.arange(1500) * 1e-3

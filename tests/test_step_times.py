@@ -56,6 +56,7 @@ STEPS = {
 SLOW = ("by direction", "viscous")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", [pytest.param(k, marks=pytest.mark.slow) if k in SLOW else k for k in STEPS]
 )
@@ -75,6 +76,7 @@ def test_the_time_of_a_step_has_an_interval_that_holds_it(kind):
         assert one.model.term.terms[-1].ramp == 0  # the model that was given
 
 
+@pytest.mark.slow
 def test_a_step_at_rest_is_anywhere_in_the_rest():
     run = log(T.Coulomb(), np.array([2.0]), 5.3, dwell=1.0, count=6)
     found = jf.identify(BASE + T.FrictionStep(), run)

@@ -22,6 +22,7 @@ def log(turns: float, units=UNITS) -> jf.Recording:
     return jf.Recording(time=time, force=force, position=position, velocity=velocity, units=units)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turns", [2.06, 5.7])
 def test_an_unbalance_is_named_however_often_the_axis_turns(turns):
     found = jf.explain(log(turns))

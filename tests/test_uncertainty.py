@@ -79,6 +79,7 @@ PROJECTIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("projection", PROJECTIONS)
 def test_coverage_of_the_affine_model(projection):
     held, fine = coverage("coulomb-viscous", projection, 48, seed=11)
@@ -108,6 +109,7 @@ def speeding(rng, rate=500.0):
     return model, jf.Recording(time=t, force=force + noise, velocity=v)
 
 
+@pytest.mark.slow
 def test_the_mass_is_as_uncertain_as_the_friction_makes_it():
     """The friction, known up to 1.5 m/s, is taken off a run up to 9 m/s to weigh the mass."""
     rng = np.random.default_rng(5)

@@ -57,6 +57,7 @@ def test_an_invalid_sample_is_passed_over_and_a_gap_is_not():
     assert signals.placed(parts).position is None
 
 
+@pytest.mark.slow
 def test_identify_and_predict_read_the_position_that_a_velocity_implies():
     given = log(0.3, 1)
     model = jf.models.coulomb_viscous() + jf.terms.Cogging()
@@ -71,6 +72,7 @@ def test_identify_and_predict_read_the_position_that_a_velocity_implies():
     np.testing.assert_allclose(both.model.parameters["pitch"], PITCH, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_cogging_is_explained_without_a_position_and_confirmed_from_another_start():
     found = jf.explain(log(0.3, 1), holdout=log(0.2041, 2))
     assert found.verdict == "explained" and [each.effect for each in found.findings] == ["cogging"]

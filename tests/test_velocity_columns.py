@@ -87,6 +87,7 @@ def axis():
     return dataclasses.replace(record, position=counted(np.asarray(record.position), 17))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", [12, 30])
 def test_a_smoothed_column_takes_nothing_off_the_bump(axis, reach):
     smoothed = dataclasses.replace(axis, velocity=averaged(np.asarray(axis.velocity), reach))
