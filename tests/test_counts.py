@@ -9,6 +9,7 @@ import pytest
 
 from jaxfric import PD, Encoder, Recording, models, simulate
 from jaxfric.explanation.counts import answered
+from jaxfric.explanation.figures import Figures
 from jaxfric.simulation.errors import in_motion, residual
 from jaxfric.simulation.prediction import Prepared
 
@@ -52,6 +53,17 @@ def test_what_has_nothing_to_do_with_counts_is_not(resolution):
     own, alone = share(run)
     part, size = share(run, 30 * np.sin(2 * np.pi * 31 * np.asarray(run.time)))
     assert size > 20 and abs(part * size**2 - own * alone**2) < 0.05 * size**2
+
+
+@pytest.mark.parametrize(("step", "rounded"), [(4.0, True), (40.0, False)])
+def test_counts_of_the_force_are_noise_where_they_are_many(step, rounded):
+    """A force of a few levels is how it is made, and no rounding."""
+    run = moved(1e-7)
+    run = dataclasses.replace(run, force=jnp.round(run.force / step) * step)
+    model = models.from_parameters(models.coulomb_viscous(), VALUES)
+    whole = float(jnp.sqrt(jnp.mean(run.force**2)))  # of the samples at rest, too
+    size = Figures(run, None, True).floor(model, 0.05) * whole / (step / np.sqrt(12))
+    assert (0.7 < size < 1.1) == rounded and size < 1.1
 
 
 def test_without_counts_there_is_no_answer():

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from .. import signals
 from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
@@ -137,8 +138,8 @@ class Figures:
     def floor(self, model: Model, lag: float) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
 
-        What is so far apart differs by noise and by what changes faster (von Neumann 1941). With
-        what the loop makes of the encoder's counts, which comes in bursts.
+        What is so far apart differs by noise and by what changes faster (von Neumann 1941). No less
+        than counts of the force make, and with what the loop makes of the encoder's, in bursts.
         """
         recording = self._recordings["here"]
         moving, force = self._samples("here", delay_of(model))
@@ -155,6 +156,9 @@ class Figures:
         apart = some(rest[count:], both) - some(rest[:-count], both)
         np.abs(apart, out=apart)
         noise = float(np.median(apart, overwrite_input=True)) / 0.6745 / np.sqrt(2)
+        step, many = signals.count_of(force[:MOST]), np.sqrt(np.mean(force[:MOST] ** 2))
+        if 2 * step <= many:  # of few levels it is how the force is made, and no rounding
+            noise = max(noise, step / np.sqrt(12))
         total = power(force, moving)
         alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
         whole = relative(rest, force, moving)

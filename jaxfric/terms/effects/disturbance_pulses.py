@@ -143,7 +143,7 @@ def _dates(term: DisturbancePulses) -> dict[str, float]:
 
 
 # More in a row nobody reads.
-NAMED = 4
+NAMED = 6
 
 
 def listed(values: Mapping[str, float], extent: Extent) -> str | None:
