@@ -56,6 +56,22 @@ def test_a_gain_that_may_be_none_is_not_told():
         assert tuple(found.parameters) == told and (found.attribute is None) != bool(told)
 
 
+@pytest.mark.parametrize(("gain", "told"), [(0.0036, False), (0.05, True), (-0.0036, True)])
+def test_friction_by_the_whole_force_is_no_torque_constant(gain, told):
+    """Of u = f + μ abs(u) sign v all is 1/(1 − μ²) times what it is by the force without it."""
+    share = Estimate(np.float64(0.06), np.float64(4e-4), "1", 20.0)
+    values = {"gain": Moved(0.0, Estimate(np.float64(gain), np.float64(6e-5), "1", 20.0))}
+    findings = [
+        Finding(
+            "load_dependent_friction", "", "", (), "", {"load_friction": share}, 0.8, None, 0.0
+        ),
+        Finding("parameter_mismatch", "", "", (), "", values, 0.1, None, 0.002),
+    ]
+    left = attributes._without_load_s_gain(findings)
+    assert left[:1] == findings[:1] and len(left) == 1 + told
+    assert attributes._without_load_s_gain(findings[1:]) == findings[1:]
+
+
 def test_a_value_that_nothing_can_have_is_not_told_as_the_right_one():
     found = reworded(damping=(0.5, 0.01), mass=(-0.4, 0.06))
     assert set(found.parameters) == {"joint/elbow/damping"} and found.untold == ("body/tool/mass",)

@@ -9,6 +9,7 @@ from ..identification.uncertainty import Estimate
 from ..simulators import Attribute
 from ..simulators.columns import GAIN
 from ..terms.effects import EFFECTS
+from ..terms.effects.load_dependent_friction import LOAD_DEPENDENT_FRICTION
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .explained import Explanation
 from .finding import Finding, Moved
@@ -27,6 +28,7 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
 
     The model keeps the corrections, which are zero where the simulator is right.
     """
+    told = dataclasses.replace(told, findings=_without_load_s_gain(told.findings))
     rate = float(told.recording["sample_rate"])
     own = {key: a._replace(between=1 / rate) if a.unit == "s" else a for key, a in own.items()}
     findings = [_reworded(f, own) if f.effect == MISMATCH else f for f in told.findings]
@@ -40,6 +42,33 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
     }
     verdict = claimed(told.verdict, findings)
     return dataclasses.replace(told, findings=findings, baseline_parameters=values, verdict=verdict)
+
+
+def _without_load_s_gain(findings: Sequence[Finding]) -> list[Finding]:
+    """The findings without a gain that friction by the motor's own force makes.
+
+    Of u = f + μ abs(u) sign v, by the whole force, all is 1/(1 − μ²) times what it is of
+    f + μ abs(f) sign v, by the force without that friction: no torque constant is wrong.
+    """
+    shares = [
+        float(next(iter(f.parameters.values())).value)
+        for f in findings
+        if f.effect == LOAD_DEPENDENT_FRICTION.name
+    ]
+    found = []
+    for finding in findings:
+        gain = finding.parameters.get(GAIN) if finding.effect == MISMATCH else None
+        made = gain is not None and any(
+            abs(float(gain.value) - 1 / (1 - share**2) + 1) < share**3 + float(gain.half_width())
+            for share in shares
+            if abs(share) < 1
+        )
+        if made:
+            others = {n: m for n, m in finding.parameters.items() if n != GAIN}
+            finding = finding._replace(parameters=others)
+        if finding.parameters or not made:
+            found.append(finding)
+    return found
 
 
 def claimed(verdict: str, findings: Sequence[Finding]) -> str:
