@@ -656,8 +656,8 @@ def test_the_catalogue_holds_together():
         "parameter_mismatch asymmetric_friction stribeck viscous_nonlinearity gravity_unbalance "
         "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
-        "compliance transport_delay actuator_lag clock sensor_filter actuator_deadband "
-        "actuator_saturation "
+        "compliance force_limit position_zero transport_delay actuator_lag clock sensor_filter "
+        "actuator_deadband actuator_saturation "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
         "periodic_disturbance disturbance_force disturbance_pulses cross_axis parameter_step"
     )

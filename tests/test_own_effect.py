@@ -131,8 +131,10 @@ def test_what_is_there_already_is_refused(file):
     assert "ripple" not in effects.EFFECTS and effects.law_named("Latch") is None
 
 
-# Where a literal only looks like an effect: the demo's machine, a joint's spring, and the verb.
+# Where a literal only looks like an effect: the demo's machine, a joint's spring, a model's own
+# limit, the clock of a stream, and the verb.
 LIKE_ONE = {
+    ("models/model.py", "force_limit"), ("cli/watch.py", "clock"),
     ("cli/demo.py", "cogging"), ("export/simple.py", "spring"),
     ("explanation/attributes.py", "spring"),
 }  # fmt: skip

@@ -15,6 +15,7 @@ from ..explanation import Explanation, explain
 from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs, rows_of
 from ..simulators import Mujoco
 from ..simulators.patching import folder_of
+from ..terms.effects.position_zero import POSITION_ZERO
 from .commands import read
 from .joint_columns import WHOLE, Logged
 from .messages import message
@@ -120,7 +121,7 @@ def of_others(name: str, checked: Mapping[str, CheckedSimulator]) -> list[Check]
     return [
         c
         for c in checks
-        if c.effect == "position_zero" and c.wrong and c.parameter != f"{name} zero"
+        if c.effect == POSITION_ZERO.name and c.wrong and c.parameter != f"{name} zero"
     ]
 
 

@@ -20,6 +20,8 @@ from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import AbstractTerm, Sum
 from ..terms.effects import EFFECTS, Effect, traits
+from ..terms.effects.force_limit import FORCE_LIMIT
+from ..terms.effects.position_zero import POSITION_ZERO
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import callback, readback
 from .errors import from_to, miss, reached, worse
@@ -234,11 +236,11 @@ def _put_right(source, joint: str, told: Explanation):
     values: dict[str, tuple[float, float]] = {}
     left: list[str] = []
     for finding in told.findings:
-        if finding.effect == "position_zero" and finding.attribute:
+        if finding.effect == POSITION_ZERO.name and finding.attribute:
             (zero,) = finding.parameters.values()
             before = float(model.model.qpos0[model.joints.index(finding.attribute.split("/")[1])])
             values[finding.attribute] = before, before + float(zero.value)
-        elif finding.effect == "force_limit" and finding.attribute:
+        elif finding.effect == FORCE_LIMIT.name and finding.attribute:
             (limit,) = finding.parameters.values()
             values[finding.attribute] = float("inf"), float(limit.value)
         elif finding.effect in EFFECTS and EFFECTS[finding.effect].logged:
@@ -283,7 +285,7 @@ def _acting(told: Explanation) -> tuple[float, float, float, float]:
         elif name.endswith("/gear"):
             gain = float(moved.before) / float(moved.value)
     for finding in told.findings:
-        if finding.effect == "force_limit":
+        if finding.effect == FORCE_LIMIT.name:
             limit = float(next(iter(finding.parameters.values())).value)
         elif finding.effect in EFFECTS and _acts_late(EFFECTS[finding.effect]):
             delay = float(finding.parameters.get("delay", NONE).value)

@@ -19,7 +19,6 @@ from ..terms import at_other_times
 from ..terms.actuator import PREDICTED, REACTION, carried
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.effects import traits
-from ..terms.effects.late import SensorFilter
 from ..terms.known import KNOWN_FEEDBACK
 from ..terms.presliding import AbstractStates, starts
 
@@ -311,7 +310,8 @@ def unfiltered(model: Model) -> tuple[Model, Float[Array, ""] | None]:
 
 
 def _filters(term: AbstractTerm) -> bool:
-    return isinstance(term, SensorFilter)
+    effect = traits(term)
+    return effect.logged and not effect.shift
 
 
 def filtered(recording: Recording, signal: Float[Array, " N"], lag) -> Float[Array, " N"]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ...identification.uncertainty import Estimate
 from ...models import Model
+from ...terms.effects.force_limit import FORCE_LIMIT
 from .. import parameters as spelled, verification
 from ..baseline import at_values
 from ..evidence import FEWEST_ROWS, Evidence, gather
@@ -26,7 +27,6 @@ from ..quantities import quantity
 from ..regression import Fit, fit
 from . import limits
 from .preceding import p_value, with_preceding
-from .table import EQUATIONS
 
 # A cut that takes less than a fifth of the mismatch is none: further fits are saved.
 SUSPECT = 0.8
@@ -158,7 +158,7 @@ def with_limit(found: Explanation, bound: Bounded, commanded: Figures) -> Explan
         "is said, and the errors after are taken, of the command cut off there."
     )
     limit = Finding(
-        "force_limit", EQUATIONS["force_limit"], text, (), "", {"force_limit": bound.limit},
+        FORCE_LIMIT.name, FORCE_LIMIT.equation, text, (), "", {FORCE_LIMIT.name: bound.limit},
         bound.share, None, p_value(bound.limit),
     )  # fmt: skip
     before = {

@@ -15,13 +15,14 @@ import numpy as np
 from ...data.recording import Recording
 from ...simulators import Mujoco
 from ...terms import KNOWN_FEEDBACK, at_other_times
+from ...terms.effects.late import CLOCK
 from ..acceptance import LINEARITY
 from ..least_squares import orthonormal
 from ..mismatch import MOST_WRONG, fewest
 from ..predictions import rate
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
-ZERO, OFFSET, DRIFT = "zero/", "clock", "clock_drift"
+ZERO, OFFSET, DRIFT = "zero/", CLOCK.name, "clock_drift"
 # A quarter of the power: what leaves more is not the fault, or not alone.
 LEAVES = 0.25
 # What a clock has to leave of what all other values leave, by itself and beside them.

@@ -8,6 +8,9 @@ import numpy as np
 from ...identification.uncertainty import Estimate
 from ...simulators import Mujoco
 from ...terms.effects.end_stop import END_STOP, place
+from ...terms.effects.force_limit import FORCE_LIMIT
+from ...terms.effects.late import CLOCK, SENSOR_FILTER
+from ...terms.effects.position_zero import POSITION_ZERO
 from ..acceptance import LINEARITY
 from ..quantities import quantity
 from . import limits
@@ -140,14 +143,16 @@ def _zeros(part: Part, seen: FaultSearch) -> list[Check]:
             error = seen.faults.errors.get(name, error)
             own = Estimate(np.float64(zero), np.float64(error), unit)
             text = f"The encoder's zero of joint {joint} is at {quantity(own)} of the simulator's."
-            found.append(Check("position_zero", text, True, False, own, f"{joint} zero", attribute))
+            found.append(
+                Check(POSITION_ZERO.name, text, True, False, own, f"{joint} zero", attribute)
+            )
         elif joint == part.name:
             own = Estimate(np.float64(value), np.float64(error), unit)
             known = np.isfinite(error) and error < 1.0
             text = f"The encoder's zero is the simulator's ({quantity(own)})."
             if not known:
                 text = "The motion cannot tell the encoder's zero."
-            found.append(Check("position_zero", text, value=own, parameter=f"{joint} zero"))
+            found.append(Check(POSITION_ZERO.name, text, value=own, parameter=f"{joint} zero"))
     return found
 
 
@@ -172,21 +177,21 @@ def _clock(part: Part, seen: FaultSearch) -> Check:
             )
             if abs(faults.late) < late.half_width():
                 late = Estimate(np.float64(faults.drift), np.float64(error), "1")
-        near = () if faults.drift else ("sensor_filter",)
-        return Check("clock", f"{text}.", True, False, late, "delay", None, near, _APART)
+        near = () if faults.drift else (SENSOR_FILTER.name,)
+        return Check(CLOCK.name, f"{text}.", True, False, late, "delay", None, near, _APART)
     if OFFSET not in seen.values:
-        return Check("clock", "Not looked at.")
+        return Check(CLOCK.name, "Not looked at.")
     value, error = map(np.float64, seen.values[OFFSET])
     late = Estimate(value, error, "s")
     drift = seen.values[DRIFT]
     text = f"Force and motion are on one clock (force {quantity(late)} late"
     text += f", drift {drift[0] * 1e6:.2g} ± {1e6 * _half(drift[1]):.1g} µs a second)."
-    return Check("clock", text, value=late, parameter="delay")
+    return Check(CLOCK.name, text, value=late, parameter="delay")
 
 
 def _limit(part: Part, bound: Estimate | None) -> Check:
     if bound is None:
-        return Check("force_limit", "No command was cut off by a limit of the force.")
+        return Check(FORCE_LIMIT.name, "No command was cut off by a limit of the force.")
     count = limits.beyond(part.recording, bound)
     share = count / max(int(np.count_nonzero(np.asarray(part.recording.mask))), 1)
     text = (
@@ -194,7 +199,7 @@ def _limit(part: Part, bound: Estimate | None) -> Check:
         "command asks for more than arrives."
     )
     attribute = f"joint/{part.name}/actuatorfrcrange" if part.name else None
-    return Check("force_limit", text, True, False, bound, "force_limit", attribute)
+    return Check(FORCE_LIMIT.name, text, True, False, bound, FORCE_LIMIT.name, attribute)
 
 
 def _blocked(contact: Contact) -> Check:
@@ -233,10 +238,5 @@ def _ends(part: Part) -> list[Check]:
     return [Check("joint_limit", text, bool(said))]
 
 
-# Of what is reported as a finding.
-EQUATIONS = {
-    "position_zero": "f(q − z)",
-    "clock": "u(t) = f(t − τ)",
-    "force_limit": "u_real = clip(u, ±U)",
-    END_STOP.name: "x ≤ x_s, or x ≥ x_s",
-}
+# What is reported as a finding.
+REPORTED = (POSITION_ZERO.name, CLOCK.name, FORCE_LIMIT.name, END_STOP.name)

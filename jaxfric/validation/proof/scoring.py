@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from ...terms.effects import EFFECTS
 from ...terms.effects.actuator_saturation import ACTUATOR_SATURATION
+from ...terms.effects.force_limit import FORCE_LIMIT
 from ..concealed.definitions import unlike
 from .planning import Case
 from .trials import ANSWERS, REMEDY, SEALED, path, read
@@ -17,7 +18,7 @@ LEAST_REDUCTION = 0.1
 
 # What has another name where it is looked at before any physics: a saturation beyond which nothing
 # arrives.
-CALLED = {"force_limit": ACTUATOR_SATURATION.name}
+CALLED = {FORCE_LIMIT.name: ACTUATOR_SATURATION.name}
 
 
 class Parameter(NamedTuple):
