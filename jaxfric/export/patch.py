@@ -21,8 +21,8 @@ from ..terms import KnownColumns, KnownForce
 from ..terms.base import AbstractTerm, Sum
 from ..terms.effects import EFFECTS, Effect, traits
 from ..terms.effects.force_limit import FORCE_LIMIT
-from ..terms.effects.position_zero import POSITION_ZERO
 from ..terms.effects.parameter_mismatch import MISMATCH
+from ..terms.effects.position_zero import POSITION_ZERO
 from . import callback, readback
 from .errors import from_to, miss, reached, worse
 from .held import kept
