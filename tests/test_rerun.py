@@ -208,7 +208,8 @@ def test_a_held_out_recording_is_read_through_the_same_kernel():
 
 
 def test_a_log_that_was_put_right_is_said_beside_what_it_was():
-    told = types.SimpleNamespace(fit={"filtered_force_error": {"before": 0.9, "after": 0.01}})
+    fit = {"filtered_force_error": {"before": 0.9, "after": 0.01}}
+    told = types.SimpleNamespace(fit=fit, sanity=[{"check": "clock", "wrong": True}])
     text = as_read("x", told, {"force_error": {"before": 0.012, "file": 0.01}})
     assert text.endswith("of the log as it was read it was 90.00%")
     assert as_read("x", told, {"force_error": {"before": 0.9, "file": 0.01}}) == ""

@@ -48,10 +48,10 @@ def miss(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]
 
 def as_read(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]]) -> str:
     """What the log as it was read left of a joint's force, where it has been put right since."""
-    texts = []
+    texts, right = [], not any(row["wrong"] for row in told.sanity)
     for name, each in errors.items():
         own = told.fit[f"filtered_{name}"]
-        if own and _more(own["before"], each["before"]):
+        if own and not right and _more(own["before"], each["before"]):
             held = " of the held-out recording" if name.startswith("holdout") else ""
             texts.append(f"{percent(own['before'])}{held}")
     return (
