@@ -136,6 +136,21 @@ def test_a_value_of_a_body_that_may_be_as_it_was_is_not_told(monkeypatch):
     assert set(found.parameters) == {FORE + "mass_alone"} and "centre" not in found.text
 
 
+def test_what_cannot_be_on_another_recording_is_not_known(monkeypatch):
+    """A mass that is below zero there is a value that is not told, and no end of the run."""
+    own, held = rows(arm(), arm(mass="1.7")), rows(arm(), arm())
+    below = {FORE + "mass_alone": -0.1}
+    monkeypatch.setattr(held, "fitted", lambda names, start: (np.inf, below))
+
+    def given(told, bodies, wide=1, **of):
+        return None if wide > 1 else held if of else own
+
+    monkeypatch.setattr(agreement, "_rows", given)
+    told = [agreement.Told(Mujoco(arm(), name), [], None) for name in ("shoulder", "elbow")]
+    assert agreement.agreed(told, {"upper", "fore"}).parameters == {}
+    assert np.isinf(own.energies(below)).all() and own.impossible(below) == set(below)
+
+
 def test_what_one_joint_cannot_tell_apart_is_said():
     """One hinge sees m c and the inertia about itself: mass, centre, inertia and armature make
     these two, so that either of two numbers may be another.

@@ -479,6 +479,18 @@ def test_of_the_rest_only_noise_is_made_up_for_what_undoing_a_lag_takes_of_it(he
     assert sizes[1] / sizes[0] == pytest.approx(taken)
 
 
+def test_a_simulators_force_is_no_noise_of_the_recorded_one(healthy):
+    """What undoing a lag takes of the noise was compared with it: a dead time became a lag."""
+    run = healthy[0]
+    simulator = Known(0.9 * np.asarray(run.force))
+    posed = problem.problem_of(simulator.beside(run), simulator.model(run.units).term)
+    undoing = timing._Undoing(simulator.beside(run), posed, posed.base)
+    lag, width = EFFECTS["actuator_lag"], posed.evidence.width
+    white = np.sum(posed.evidence.average[0] ** 2)  # of nodes, each a mean of samples
+    assert undoing.hiss(None, 0.0, width) < white
+    assert undoing.hiss(None, 0.0, width) > 1.2 * undoing.hiss(lag, 8e-3, width)
+
+
 def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypatch):
     now = types.SimpleNamespace(energy=1.0)
     monkeypatch.setattr(acceptance, "_alike", lambda finalist, now, view, *_: view == "between")

@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.explanation.evidence import gather
+from jaxfric.explanation.motion import motion_of
 from jaxfric.simulation.errors import in_motion
 from jaxfric.simulation.prediction import Prepared
 from jaxfric.simulators.columns import GAIN, distinct
 from jaxfric.simulators.inverse import Motion, along, forces
+from jaxfric.terms import Dahl
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -149,3 +152,27 @@ def test_where_its_friction_drives_before_the_axis_has_turned_nothing_is_compare
     left = (force - np.asarray(seen.channels["known_force"]))[moving]
     assert moving.mean() > 0.9
     assert np.max(np.abs(left)) < 0.05 * 3.0
+
+
+def test_friction_that_builds_up_goes_on_where_the_simulators_force_is_not_compared():
+    """Its reversals are masked, since MuJoCo's friction is soft there; the bristle bends on."""
+    text, _ = stopping(count=2)
+    time, distance, level = 1e-3 * np.arange(12000), 0.05, 3.0
+    speed, position = 0.9 * np.sin(1.5 * time), -0.6 * np.cos(1.5 * time)
+    smooth_model = mujoco.MjModel.from_xml_string(text.replace('frictionloss="3"', ""))
+    motion = Motion(*(x[:, None] for x in (position, speed, 1.35 * np.cos(1.5 * time))))
+    steps = np.diff(position, prepend=position[0])
+    bent = [1.0]  # as in steady slip
+    for step in steps[1:]:  # Dahl's equation, exact for each step
+        bent.append(np.sign(step) + (bent[-1] - np.sign(step)) * np.exp(-abs(step) / distance))
+    force = forces(mujoco, smooth_model, motion)[:, 0] + level * np.array(bent)
+    units = {"force": "N·m", "position": "rad"}
+    seen = jf.simulators.mujoco(text).beside(jf.Recording(time, force, position, units=units))
+    assert not np.asarray(seen.mask).all()
+    rows = gather(motion_of(seen))
+    lacking = rows.columns(Dahl(), np.array([[distance]]))[0, :, 0]
+    assert np.linalg.norm(rows.target) > 0.02 * np.linalg.norm(rows.force)
+    assert np.linalg.norm(rows.target - level * lacking) < 0.02 * np.linalg.norm(rows.target)
+    # A load on a spring begins anew after each: it swings by an acceleration that is derived.
+    assert len(np.unique(rows.motion.segment)) == 1
+    assert len(np.unique(rows.pieces)) >= 6

@@ -11,6 +11,7 @@ import pytest
 from jaxfric import models, terms
 from jaxfric.cli import main
 from jaxfric.cli.joint_columns import logged
+from jaxfric.cli.robot_joints import _scales
 from jaxfric.data.joints import columns_of
 from jaxfric.data.tables import load
 from jaxfric.export.callback import callback
@@ -190,6 +191,15 @@ def named(tmp_path, header, held="", columns=(), save=None, joint=None):
 
 
 WHOLE = "time,hip_position,hip_torque,knee_position,knee_torque"
+
+
+def test_a_joint_s_own_factor_goes_before_that_of_all_positions():
+    given = {"position": 2.0, "elbow_position": 3.0, "elbow_force": 5.0, "time": 0.1}
+    joints = ["shoulder", "elbow"]
+    own = {"time": 0.1, "position": 3.0, "shoulder": 2.0, "reference": 3.0, "force": 5.0}
+    assert _scales(given, joints, "elbow", True) == own
+    assert _scales(given, joints, "shoulder") == {"time": 0.1, "position": 2.0, "elbow": 3.0}
+    assert _scales({"knee_position": 3.0}, joints, "elbow") == {"knee_position": 3.0}
 
 
 def test_a_joint_without_a_force_is_told_and_one_that_no_log_knows_stands(tmp_path):

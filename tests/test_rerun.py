@@ -1,13 +1,18 @@
 """A simulator's closed loop run again with the recording's reference and controller."""
 
 import json
+import types
 
 import numpy as np
 import pytest
 
-from jaxfric import cli
+from jaxfric import Recording, cli
 from jaxfric.data.joints import references_of
-from jaxfric.simulators import closed
+from jaxfric.explanation.evidence import gather
+from jaxfric.explanation.motion import motion_of
+from jaxfric.export import readback
+from jaxfric.export.errors import as_read
+from jaxfric.simulators import Mujoco, closed
 from jaxfric.simulators.inverse import Motion
 from jaxfric.simulators.patching import patched
 
@@ -151,3 +156,60 @@ def test_the_command_runs_the_loops_again(tmp_path, capsys):
     assert track["after"] == pytest.approx(track["recorded"], rel=0.02)
     assert abs(track["before"] / track["recorded"] - 1) > 0.02
     assert "Run again" in (tmp_path / "out.html").read_text()
+
+
+CART = """<mujoco><option gravity="0 0 0"/><worldbody><body><joint name="x" type="slide"
+ axis="1 0 0" damping="4"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></worldbody>
+ <actuator><general name="m" joint="x"{}/></actuator></mujoco>"""
+
+
+def carted(seed, delay=0.0, lag=0.0, noise=0.01, rate=9.0):
+    """A cart's motion and command, which is so much earlier, s, and ahead of a lag."""
+    time = 1e-3 * np.arange(6000)
+    phase, size = rate * (time + delay), 0.3 * rate
+    force = 4 * size * np.cos(phase) - 2 * size * rate * np.sin(phase)
+    force -= lag * rate * (4 * size * np.sin(phase) + 2 * size * rate * np.cos(phase))
+    draw = noise * np.random.default_rng(seed).normal(size=(2, len(time)))
+    units = {"force": "N", "position": "m"}
+    position = 0.3 * np.sin(rate * time) + 1e-3 * draw[1]
+    return Recording(time, force + draw[0], position, units=units)
+
+
+def answered(logs, width=0.03):
+    """What an explanation says of its own rows."""
+    known = {"width": width, "force_taken_later": 0.0, "force_taken_later_after": 0.0}
+    fit = {"filtered_force_error": known | {"across_reversals": False}}
+    return types.SimpleNamespace(fit=fit), logs
+
+
+LATE = {"delay": ' delay="0.02" nsample="10"', "lag": ' dyntype="filterexact" dynprm="0.02"'}
+
+
+@pytest.mark.parametrize("what", LATE)
+def test_a_file_with_a_late_actuator_is_measured_with_its_late_force(what):
+    """20 ms at 9 rad/s are a fifth of the force, which the file's actuator accounts for."""
+    told, logs = answered([carted(1, **{what: 0.02})])
+    before, after = (Mujoco(CART.format(own)) for own in ("", LATE[what]))
+    (errors,) = readback.errors(told, before, after, logs, None).values()
+    assert errors["before"] > 0.1
+    assert errors["file"] < 0.01
+
+
+def test_a_held_out_recording_is_read_through_the_same_kernel():
+    """By a kernel of its own it had another error, though nothing is new."""
+    told, logs = answered([carted(1), carted(2)], 0.06)
+    before, after = Mujoco(CART.format("")), Mujoco(CART.format(""))
+    errors = readback.errors(told, before, after, logs, None)[readback.HELD]
+    seen = before.beside(logs[1])
+    rows = gather(motion_of(seen), reach=0.06)
+    expected = np.linalg.norm(rows.target) / np.linalg.norm(rows.force)
+    assert gather(motion_of(seen)).reach != pytest.approx(0.06, rel=0.1)
+    assert errors["before"] == pytest.approx(expected, rel=1e-6) == errors["file"]
+
+
+def test_a_log_that_was_put_right_is_said_beside_what_it_was():
+    fit = {"filtered_force_error": {"before": 0.9, "after": 0.01}}
+    told = types.SimpleNamespace(fit=fit, sanity=[{"check": "clock", "wrong": True}])
+    text = as_read("x", told, {"force_error": {"before": 0.012, "file": 0.01}})
+    assert text.endswith("of the log as it was read it was 90.00%")
+    assert as_read("x", told, {"force_error": {"before": 0.9, "file": 0.01}}) == ""

@@ -219,6 +219,10 @@ def test_angles_in_degrees_and_columns_of_whole_joints_that_are_swapped(motion):
     time, position, force = motion
     for each in check_logs(parts(time, np.rad2deg(position), force)):
         assert "in degrees" in each.wrong and "--scale position=0.0174533" in each.wrong
+    shoulder, elbow = check_logs(parts(time, position * [1, 180 / np.pi], force))
+    assert "position of joint elbow is in degrees" in elbow.wrong
+    assert "--scale elbow_position=0.0174533" in elbow.wrong
+    assert shoulder.wrong == f"Nothing is compared: {elbow.wrong}"
     for each in check_logs(parts(time, position[:, ::-1], force[:, ::-1])):
         assert "columns of the joints shoulder and elbow are swapped" in each.wrong
         assert "elbow_position=NAME,elbow_force=NAME" in each.wrong

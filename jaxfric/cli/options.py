@@ -101,7 +101,7 @@ def columns(command: ArgumentParser):
         type=factors,
         default={},
         metavar="ROLE=FACTOR,…",
-        help="for instance position=0.001",
+        help="for instance position=0.001; of one joint of a robot elbow_position=0.0174533",
     )
     group.add_argument(
         "--units",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data.joints import COMMAND, references_of
+from ..data.joints import COMMAND, ROLES, references_of
 from ..data.recording import Recording
 from ..data.tables import load
 from ..explanation import Explanation, explain
@@ -159,11 +159,12 @@ def _log(
     """The recording of one joint, with the positions of the others as channels."""
     units = {"force": "N·m", "position": "rad"} if hinge else {"force": "N", "position": "m"}
     units |= arguments.units
+    given = arguments.scale
     if not own:
-        columns = dict(arguments.columns)
+        columns, scale = dict(arguments.columns), _scales(given, [name], name)
         if COMMAND in columns:
             columns["force"] = columns.pop(COMMAND)
-        return read(path, arguments, units=units, columns=columns)
+        return read(path, arguments, units=units, columns=columns, scale=scale)
     others = {joint: roles["position"] for joint, roles in own.items() if joint != name}
     roles = {**own[name], **others, **dict.fromkeys(OTHERS, "")}
     if COMMAND in roles:
@@ -176,7 +177,26 @@ def _log(
             roles[role] = arguments.columns[role]
     if "segment" not in arguments.columns and "segment" in load(Path(path)).columns:
         roles["segment"] = "segment"
-    turned = arguments.scale.get("position")
-    turns = [*others, *(["reference"] if name in wanted else [])]
-    scale = arguments.scale | ({} if turned is None else dict.fromkeys(turns, turned))
+    scale = _scales(given, list(own), name, name in wanted)
     return read(path, arguments, columns=roles, scale=scale, units=units, served=False)
+
+
+def _scales(
+    given: Mapping[str, float], joints: Sequence[str], name: str, referred: bool = False
+) -> dict[str, float]:
+    """The factors of the columns of one joint's recording: `elbow_position` before `position`.
+
+    Another joint's position is a channel of its name; a reference is in the unit of its position.
+    """
+    named = {f"{joint}_{role}" for joint in joints for role in (*ROLES, COMMAND)}
+    found = {role: factor for role, factor in given.items() if role not in named}
+    for joint in joints:
+        factor = given.get(f"{joint}_position", given.get("position"))
+        if factor is not None:
+            found["position" if joint == name else joint] = factor
+    if referred and "position" in found:
+        found["reference"] = found["position"]
+    for role in (COMMAND, "force"):
+        if f"{name}_{role}" in given:
+            found["force"] = given[f"{name}_{role}"]
+    return found

@@ -61,14 +61,14 @@ def patch(path: str, document: Mapping[str, Any]) -> str:
     lines += [f"  {line}" for line in document["written"] or ["nothing to change"]]
     for line in document["left"]:
         lines += wrapped(f"  not written: {line}")
-    table = [["force error", "before", "with the file", "with the callback too"]]
+    table = [["filtered force error", "before", "with the file", "with the callback too"]]
     for joint, errors in document["errors"].items():
         for name, error in errors.items():
             held = "held out" if name.startswith("holdout") else "recording"
             cells = [percent(error[w]) if w in error else "" for w in ("before", "file", "forces")]
             table.append([f"{joint}, {held}", *cells])
     lines += ["", *aligned(table, (1, 2, 3))]
-    for line in document["misses"]:
+    for line in (*document["as_read"], *document["misses"]):
         lines += ["", *wrapped(line)]
     lines += _rerun(document["rerun"])
     return "\n".join(lines)

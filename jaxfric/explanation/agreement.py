@@ -66,6 +66,10 @@ class Agreement(NamedTuple):
         return any(name in GRAVITY for name in self.parameters)
 
 
+# The error of what another recording contradicts beyond all that a body can be.
+UNKNOWN = np.float64(np.inf)
+
+
 def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     """What several joints say of the bodies that move with them.
 
@@ -83,7 +87,8 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
         state, moved = found.values, _moved(rows, others, found.values)
         while unsure := {name for name, m in moved.items() if m.may_be_none}:
             rest = {name: value for name, value in state.items() if name not in unsure}
-            _, state = rows.fitted(rest, rest)
+            energy, state = rows.fitted(rest, rest)
+            state = state if np.isfinite(energy) else {}
             moved = _moved(rows, others, state)
     values = {name: float(m.value) for name, m in moved.items()}
     known = {name: m.estimate for name, m in moved.items()}
@@ -99,14 +104,19 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
 
 def _moved(rows: Bodies, others, state: State) -> dict[str, Moved]:
     """The values of bodies and of gravity in a state, with what `others` add to their errors: rows
-    through another kernel or of another recording, or `None`, and how they do.
+    through another kernel or of another recording, or `None`, and how they do. Of a body that
+    cannot be there they know nothing.
     """
     own = {n for n in state if n in rows.owner or n in GRAVITY}
     known = {n: e for n, e in rows.estimates(state).items() if n in own} if own else {}
     for more, joined in others:
         if own and more is not None:
-            _, there = more.fitted(state, state)
-            known = joined(known, more.estimates(there))
+            energy, there = more.fitted(state, state)
+            if np.isfinite(energy):
+                known = joined(known, more.estimates(there))
+                continue
+            for name in more.impossible(there) or own:
+                known[name] = known[name]._replace(standard_error=UNKNOWN)
     return {name: Moved(rows.before[name], estimate) for name, estimate in known.items()}
 
 

@@ -78,8 +78,23 @@ class Bodies:
         return self.powers - 2 * self.pulls @ shift + bent
 
     def energies(self, state: State, any_: bool = False) -> np.ndarray:
-        """What a state leaves of each joint, in units of its noise's energy, `(joints,)`."""
-        return self._energies(self.shift(state, any_))
+        """What a state leaves of each joint, in units of its noise's energy, `(joints,)`: without
+        bound where a body cannot be.
+        """
+        try:
+            return self._energies(self.shift(state, any_))
+        except ValueError:
+            return np.full(len(self.joints), np.inf)
+
+    def impossible(self, state: State) -> set[str]:
+        """The numbers of the bodies that cannot be in a state."""
+        found = set()
+        for name in state.keys() & self.owner.keys():
+            try:
+                self.weight(self.owner[name][0], state)
+            except ValueError:
+                found.add(name)
+        return found
 
     def shift(self, state: State, any_: bool = False) -> np.ndarray:
         """By how much the linear parameters differ from the simulator's; `any_`: also of a body

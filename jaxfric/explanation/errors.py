@@ -57,7 +57,12 @@ def document(better: Improved, filtered: dict, model: Model, figures: Figures) -
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach),
         "filtered_force_error": filtered["force_error"]
-        | {"width": reach, "force_taken_later": problem.delay},
+        | {
+            "width": reach,
+            "force_taken_later": problem.delay,
+            "force_taken_later_after": better.findings.undelayed.problem.delay,
+            "across_reversals": problem.reversals,
+        },
         "filtered_holdout_force_error": filtered["holdout_force_error"],
         "filtered_holdout_refitted_error": refitted["filtered"],
         "filtered_noise_floor": filtered["noise_floor"],
@@ -134,9 +139,16 @@ def _adjusted(findings: Findings) -> dict[str, list[str]]:
     return adjusted
 
 
-def through_kernel(model: Model, recording: Recording, delay: float = 0.0) -> float:
-    """A model's force error through the kernel, at its own values; `delay` as `gather` takes it."""
+def through_kernel(
+    model: Model,
+    recording: Recording,
+    delay: float = 0.0,
+    reach: float | None = None,
+    reversals: bool = False,
+) -> float:
+    """A model's force error through the kernel, at its own values; the others as `gather` takes."""
     with jax.enable_x64(True):
-        evidence = gather(motion_of(cast(recording)), delay=delay)
+        motion = motion_of(cast(recording))
+        evidence = gather(motion, delay=delay, reach=reach, reversals=reversals)
         given = at_values(cast(model), evidence)
     return float(np.sqrt(given.energy / float(evidence.force @ evidence.force)))

@@ -38,6 +38,7 @@ class Evidence(NamedTuple):
     - `elapsed`: time since the start without interruptions, s, at the nodes, `(M,)`.
     - `limits`: magnitudes of the recording, `Scales` of floats; `reach`: the kernel's half-width,
       s; `width`: the same in samples.
+    - `pieces`: numbers of the stretches in which the force is compared throughout, `(M,)`.
     - `clock`: whether the time stamps increase throughout, so that time is a coordinate.
     - `located`: whether a position was recorded; else there is none, or the velocity's integral.
     """
@@ -52,6 +53,7 @@ class Evidence(NamedTuple):
     side: np.ndarray
     centre: np.ndarray
     elapsed: np.ndarray
+    pieces: np.ndarray
     limits: Any
     reach: float
     width: int
@@ -96,10 +98,20 @@ class Evidence(NamedTuple):
             some = betas[start : start + most]
             size = few if len(some) <= few else most
             full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
-            plain, momentum = evaluate(term, full, self.motion)
+            plain, momentum = evaluate(term, full, self.read_by(term))
             momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
             parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
         return np.concatenate(parts).transpose(0, 2, 1)
+
+    def read_by(self, term: AbstractTerm) -> Recording:
+        """The nodes as a term reads them: for a load, in pieces.
+
+        A bristle bends with the position, which is known where a simulator's force is masked. A
+        load begins to swing by the acceleration, which jumps there and is derived.
+        """
+        if not term.stepped:
+            return self.motion
+        return eqx.tree_at(lambda m: m.segment, self.motion, jnp.asarray(self.pieces))
 
     def _known(self, term: KnownColumns) -> np.ndarray:
         """Rows of what a simulator says its parameters add, `(J, p)`."""
@@ -156,6 +168,7 @@ class Evidence(NamedTuple):
             rows=self.rows[inside] - windows.start,
             centre=self.centre[inside] - first,
             elapsed=self.elapsed[chosen],
+            pieces=self.pieces[chosen],
             **rows,
         ), inside
 
@@ -235,6 +248,7 @@ def gather(
         side=np.sign(parts["velocity"][centre]),
         centre=centre,
         elapsed=np.pad(parts["elapsed"], (0, pads), mode="edge"),
+        pieces=_pieces(parts, pads),
         limits=limits,
         reach=span,
         width=step * half,
@@ -298,6 +312,13 @@ def _known_from(parts: dict, first: np.ndarray, rows: np.ndarray, way: float) ->
     start = np.maximum.accumulate(np.where(begins, total, 0.0))
     kept = rows[(total - start)[first] > way]
     return kept if len(kept) > (1 - FORGOTTEN) * len(rows) else rows
+
+
+def _pieces(parts: dict, pads: int) -> np.ndarray:
+    """Numbers of the stretches of nodes in one run that are compared, or are not, `(M,)`."""
+    begins = np.diff(parts["run"]) != 0
+    begins |= np.diff(parts["compared"])
+    return np.pad(np.cumsum(begins, dtype=np.int32), (1, pads), mode="edge")
 
 
 def _without_simulated(force: np.ndarray, parts: dict, index, rows, average, slope) -> np.ndarray:

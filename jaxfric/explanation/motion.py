@@ -4,9 +4,11 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 
 from .. import signals
 from ..data.recording import Recording, pad
+from ..terms import KNOWN_MASKED
 from .evaluation import without_known
 
 
@@ -54,12 +56,20 @@ def derived(recording: Recording) -> Motion:
         recording, source="", sha256="", num_segments=1, position_every=1
     )
     bare = without_known(nameless)
+    bare = dataclasses.replace(bare, mask=moves(recording))
     padded, whole = (pad(log, padded_length(recording.num_samples)) for log in (bare, nameless))
     smoothed = 0.0
     if padded.velocity is None:
         choice = signals.choose(padded)
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
-    return Motion(recording, dataclasses.replace(padded, channels=whole.channels), smoothed)
+    padded = dataclasses.replace(padded, mask=whole.mask, channels=whole.channels)
+    return Motion(recording, padded, smoothed)
+
+
+def moves(recording: Recording) -> np.ndarray:
+    """Where the motion is known, `(N,)`: also where a simulator's force alone says nothing."""
+    mask, masked = np.asarray(recording.mask), recording.channels.get(KNOWN_MASKED)
+    return mask if masked is None else mask | (np.asarray(masked) > 0)
 
 
 def padded_length(count: int) -> int:

@@ -1,14 +1,16 @@
 """Nodes: local means of a recording, a sixth of the kernel apart, and their weights in rows."""
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
 from ..data.recording import Recording
 from ..data.shifting import shifted
-from ..terms import KNOWN_FEEDBACK, KNOWN_FORCE, KNOWN_REST, at_other_times
+from ..terms import KNOWN_FEEDBACK, KNOWN_FORCE, KNOWN_MASKED, KNOWN_REST, at_other_times
 from ..terms.sample import Scales
-from .motion import padded_length
+from .motion import moves, padded_length
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
 # which is below 1e-4 of its peak. A wider kernel on the same nodes has more of them.
@@ -26,12 +28,14 @@ def stride(half: int) -> int:
 def node_signals(
     recording: Recording, limits: Scales, step: int, delay: float, smoothed: float
 ) -> dict:
-    """Local means of every signal, `step` samples apart, with the run that each node lies in.
+    """Local means of every signal, `step` samples apart, with the run that each node lies in, and
+    whether its force is `compared`: what has a memory goes on where a simulator's says nothing.
 
     `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
     """
-    time, mask = np.asarray(recording.time, float), np.asarray(recording.mask)
-    linked = signals.host_continuous(recording, limits.interval)
+    time, mask = np.asarray(recording.time, float), moves(recording)
+    silent = mask & ~np.asarray(recording.mask)
+    linked = signals.host_continuous(dataclasses.replace(recording, mask=mask), limits.interval)
     run = np.pad(np.cumsum(~linked), (1, 0))
     steps = np.where(linked, np.diff(time), limits.interval)
     series = {
@@ -42,7 +46,8 @@ def node_signals(
     }
     if recording.position is not None:
         series["position"] = np.asarray(recording.position, float)
-    series |= {f"channel {k}": np.asarray(v, float) for k, v in recording.channels.items()}
+    channels = {k: v for k, v in recording.channels.items() if k != KNOWN_MASKED}
+    series |= {f"channel {k}": np.asarray(v, float) for k, v in channels.items()}
     if delay:
         series["force"] = at_other_times(
             recording, series["force"], lambda force: _later(time, force, run, delay)
@@ -73,7 +78,7 @@ def node_signals(
         derived = name == "velocity" or name.endswith("momentum")
         lost = 1 / 12 + (smoothed / step**2 if derived else 0.0)
         means[name][inner] -= lost * bend
-    return means | {"run": label}
+    return means | {"run": label, "compared": ~np.any(near & silent[at], axis=1)}
 
 
 def _later(time, force, run, delay):
@@ -85,7 +90,7 @@ def _later(time, force, run, delay):
 
 def windows(parts: dict, reach: float, half: int = NODES) -> tuple[np.ndarray, ...]:
     """Nodes of the rows, `half` of them on either side of every third one (of every sixth where
-    there are twelve), whether they lie in one run, and their weights.
+    there are twelve), whether they lie in one run and are compared, and their weights.
     """
     middle = np.arange(half, len(parts["time"]) - half, stride(half))
     index = middle[:, None] + np.arange(-half, half + 1)[None, :]
@@ -97,6 +102,7 @@ def windows(parts: dict, reach: float, half: int = NODES) -> tuple[np.ndarray, .
     average, slope = signals.kernel_weights(
         signals.kernel(offset / reach).T, slope.T, np.sum(slope * offset, axis=1)
     )
+    whole &= parts["compared"][index].all(axis=1)
     return index, whole, np.ascontiguousarray(average.T), np.ascontiguousarray(slope.T)
 
 

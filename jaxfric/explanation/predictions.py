@@ -26,7 +26,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
         if term.coordinates & PREDICTED:
             continue  # a fault acts on what the motion needs, not on itself
         plain, moving = evaluate(
-            term, np.repeat(beta[None], sizes(term)[0], axis=0), evidence.motion
+            term, np.repeat(beta[None], sizes(term)[0], axis=0), evidence.read_by(term)
         )
         borne = alpha * [carried(part) for part in summands(term) for _ in part.affine]
         force = force + alpha @ np.asarray(plain)[0]

@@ -128,7 +128,8 @@ class _Undoing:
     def _hiss(self, effect: Effect | None, time: float, width: int) -> float:
         """What white noise of the force leaves in a row, in parts of its power."""
         noise = _undone(self.noise, effect, time)
-        rows = gather(noise, width, reversals=self.problem.reversals).target
+        # Of the noise alone: a simulator's force, which the target is without, is none of it.
+        rows = gather(noise, width, reversals=self.problem.reversals).force
         return float(np.mean(rows**2))
 
     def rest(self, effect: Effect | None, time: float, width: int | None = None) -> np.ndarray:

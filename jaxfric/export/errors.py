@@ -44,3 +44,17 @@ def miss(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]
             left = f"{percent(own['after'])} by its answer, {percent(reached(each))} by {by}"
             texts.append(held + left)
     return f"joint {joint}: not all of its answer is in the file: {'; '.join(texts)}" * bool(texts)
+
+
+def as_read(joint: str, told: Explanation, errors: Mapping[str, Mapping[str, float]]) -> str:
+    """What the log as it was read left of a joint's force, where it has been put right since."""
+    texts, right = [], not any(row["wrong"] for row in told.sanity)
+    for name, each in errors.items():
+        own = told.fit[f"filtered_{name}"]
+        if own and not right and _more(own["before"], each["before"]):
+            held = " of the held-out recording" if name.startswith("holdout") else ""
+            texts.append(f"{percent(own['before'])}{held}")
+    return (
+        f"joint {joint}: before is of the log as it was put right; of the log as it was read "
+        f"it was {', '.join(texts)}"
+    ) * bool(texts)

@@ -24,7 +24,7 @@ from ..terms.effects.force_limit import FORCE_LIMIT
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..terms.effects.position_zero import POSITION_ZERO
 from . import callback, readback
-from .errors import from_to, miss, reached, worse
+from .errors import as_read, from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
 from .rerun import Rerun, rerun
@@ -53,6 +53,7 @@ class Patch(NamedTuple):
     - `errors`: force errors through the kernel of the explanation, by recording ("force_error",
       "holdout_force_error"): `before`, of the `file` alone, and with the `forces` beside it; from
       the file as it was read again. `misses`: where that is more than the joint's answer leaves.
+      `as_read`: what was left of joints whose log has been put right since.
     """
 
     text: str
@@ -63,12 +64,14 @@ class Patch(NamedTuple):
     module: str
     misses: tuple[str, ...] = ()
     rerun: Rerun = Rerun()
+    as_read: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """What was done as plain data, without the texts."""
         return {
             "written": self.written, "left": self.left, "errors": self.errors,
-            "misses": list(self.misses), "rerun": self.rerun.to_dict(),
+            "misses": list(self.misses), "as_read": list(self.as_read),
+            "rerun": self.rerun.to_dict(),
         }  # fmt: skip
 
     def after(self, joint: str) -> dict[str, float]:
@@ -127,7 +130,11 @@ def patch(
     ]
     left += [f"{_label(key)} → {values[key][1]:.5g}: {why}" for key, why in done.left.items()]
     misses = tuple(miss(joint, told, errors[joint]) for joint, told in found.items())
-    patch = Patch(done.text, forces, written, left, errors, module, tuple(filter(None, misses)))
+    notes = tuple(as_read(joint, told, errors[joint]) for joint, told in found.items())
+    patch = Patch(
+        done.text, forces, written, left, errors, module, tuple(filter(None, misses)),
+        as_read=tuple(filter(None, notes)),
+    )  # fmt: skip
     return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
 
 

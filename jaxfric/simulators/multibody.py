@@ -13,7 +13,15 @@ from jaxtyping import Bool, Float
 from .. import signals
 from ..data.recording import Recording
 from ..models import Model
-from ..terms import KNOWN_MOMENTUM, KNOWN_REST, KnownColumns, KnownForce, Offset, channels_of
+from ..terms import (
+    KNOWN_MASKED,
+    KNOWN_MOMENTUM,
+    KNOWN_REST,
+    KnownColumns,
+    KnownForce,
+    Offset,
+    channels_of,
+)
 from ..terms.base import Sum
 from ..terms.effects.cross_axis import neighbour_channel
 from . import actuation, columns, inverse
@@ -120,6 +128,11 @@ class Mujoco(AbstractSimulator):
                 "actuator's command: pass it through the simulator's driven(recording) first."
             )
         known = along(recording, force, held_out)
+        # What is soft has a force, by which it goes on: it is only not compared.
+        soft = np.asarray(sound[KNOWN_MASKED]) > 0
+        known = dataclasses.replace(known, mask=np.asarray(known.mask) & ~soft)
+        masked = np.where(soft & np.asarray(recording.mask), 1.0, 0.0)
+        sound = sound | {KNOWN_MASKED: jnp.asarray(masked)}
         # Where the other joints are is in the force; by their names programs would differ.
         kept = {name: each for name, each in known.channels.items() if name not in self.joints}
         return dataclasses.replace(known, channels=kept | sound)
@@ -132,15 +145,16 @@ class Mujoco(AbstractSimulator):
         for number, parts in enumerate(self.columns.along(seen, time)):
             found |= dict(zip(channels_of(number), parts, strict=True))
         found |= self._neighbours(seen.motion.velocity)
-        gone = self._sticks(seen) | self.limited(recording)
+        soft, gone = self._sticks(seen), self.limited(recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
-        if gone.all():
+        if (gone | soft).all():
             raise ValueError(
                 f"{recording.source or 'The recording'}: the joint {self.joint} stands, or is at a "
                 "limit of the model, in all samples, so that nothing can be compared. Is it the "
                 "column of a joint that moved?"
             )
+        found[KNOWN_MASKED] = np.where(soft & ~gone, 1.0, 0.0)
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
         return np.where(gone, np.nan, seen.force[:, own]), sound
 

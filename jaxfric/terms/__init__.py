@@ -74,6 +74,7 @@ from .known import (
     KNOWN as KNOWN,
     KNOWN_FEEDBACK as KNOWN_FEEDBACK,
     KNOWN_FORCE as KNOWN_FORCE,
+    KNOWN_MASKED as KNOWN_MASKED,
     KNOWN_MOMENTUM as KNOWN_MOMENTUM,
     KNOWN_REST as KNOWN_REST,
     KnownColumns as KnownColumns,

@@ -21,6 +21,9 @@ KNOWN_REST, KNOWN_MOMENTUM = "known_rest", "known_momentum"
 # The part of a recorded force, N, that a servo makes of the motion itself: not late where its
 # command is.
 KNOWN_FEEDBACK = "known_feedback"
+# One where a simulator's force alone says nothing and the motion is known, else zero: what has a
+# memory goes on there.
+KNOWN_MASKED = "known_masked"
 # Channels that begin so belong to a simulator.
 KNOWN = "known_"
 

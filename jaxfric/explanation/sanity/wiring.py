@@ -155,7 +155,7 @@ def _positions(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
         if max(left) < RIGHT:
             tried[change] = float(np.mean(left))
     best = min(tried, key=lambda change: tried[change], default=None)
-    return _told(best) if best is not None and tried[best] < 0.5 * before else {}
+    return _told(best, simulator.joints) if best is not None and tried[best] < 0.5 * before else {}
 
 
 # What logs count positions in, in the model's unit.
@@ -175,17 +175,22 @@ def _changes(simulator: Mujoco) -> Iterator[Change]:
     hinges = [is_hinge(simulator.mujoco, simulator.model, i) for i in range(len(joints))]
     for units, turns in ((ANGLES, True), (LENGTHS, False)):
         names = tuple(name for name, hinge in zip(joints, hinges, strict=True) if hinge == turns)
-        yield from (Change(names, factor, unit) for unit, factor in units.items() if names)
+        # One of them alone, as the only one with another encoder; or the whole log.
+        groups = dict.fromkeys([*((name,) for name in names), names] if names else [])
+        yield from (Change(some, f, unit) for some in groups for unit, f in units.items())
 
 
-def _told(change: Change) -> dict[str, str]:
+def _told(change: Change, joints: Sequence[str]) -> dict[str, str]:
     names = change.names
     every = ", ".join(names[:-1]) + " and " * (len(names) > 1) + names[-1]
     if change.unit:
+        whole = len(names) == len(joints)
+        scaled = ["position"] if whole else [f"{name}_position" for name in names]
+        given = ",".join(f"{role}={change.factor:.6g}" for role in scaled)
+        what = "positions ({}) are" if len(names) > 1 else "position of joint {} is"
         text = (
-            f"The positions ({every}) are in {change.unit}: with {change.factor:.6g} of them the "
-            f"simulator describes the force. Give --scale position={change.factor:.6g}, which is "
-            "of all joints."
+            f"The {what.format(every)} in {change.unit}: with {change.factor:.6g} times that the "
+            f"simulator describes the force. Give --scale {given}."
         )
     elif change.factor < 0:
         text = (
