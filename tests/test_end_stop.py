@@ -35,7 +35,7 @@ def test_a_hard_stop_is_named_with_its_place_and_nothing_else():
     low, high = stop.parameters["stop_position"].interval()
     assert low < 0.4 < high and high - low < 0.005
     assert "end_stop" not in {each["effect"] for each in found.not_visible}
-    assert "pressed by up to 4.0" in stop.sentence and "2 times" in stop.sentence
+    assert "it stands there 2 times, pressed by up to 4" in stop.sentence
     healthy = seen(log(Axis(), beyond(1)))
     assert healthy.stops == [] and not healthy.leans
 

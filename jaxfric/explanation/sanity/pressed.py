@@ -238,8 +238,9 @@ def _held_elsewhere(seen: _Standing, zone: float, side: float, far: float, near:
 
 
 # On its way into a stop an axis slows down by a tenth within 0.1 of the depth that it gets to where
-# damping brakes it, and within 0.44 where a spring does: that depth is less than twice the rest.
-FREE, DEEPER = 0.9, 2.0
+# damping brakes it, and within 0.44 where a spring does. A drive that pushes on by a tenth of the
+# friction more, of a whole one at least in the end, adds 0.1: the depth is below 2.2 of the rest.
+FREE, PUSHES, DEEPER = 0.9, 0.1, 2.5
 # Noise of the position moves a speed by a twentieth, half of that tenth.
 STEADY = 0.05
 
@@ -254,6 +255,7 @@ def _begins(
     it moves outwards, and nothing stops it; `lowest`, what is known without a look.
     """
     time, outward = np.asarray(recording.time, float), side * np.asarray(recording.position, float)
+    force = side * np.asarray(recording.force, float)
     interval, noise = problem.evidence.limits.interval, signals.choose(recording).noise
     begins = pressed[np.diff(pressed, prepend=-np.inf) > 2 * problem.evidence.half]
     found = [lowest]
@@ -264,9 +266,10 @@ def _begins(
         arrives = side * seen.velocity[before[-1]]
         over = 1 + int(np.sqrt(2) * noise / (STEADY * arrives * interval))
         first, last = np.searchsorted(time, (seen.time[before[-1]], seen.time[visit]))
-        way = outward[max(first - over, 0) : last + 1]
+        way, push = (x[max(first - over, 0) : last + 1] for x in (outward, force))
         speed = (way[over:] - way[:-over]) / (over * interval)
-        fast = np.flatnonzero(speed >= FREE * arrives)
+        more = np.convolve(push - push[over], np.ones(over) / over, "valid")[: len(speed)]
+        fast = np.flatnonzero((speed >= FREE * arrives) & (more <= PUSHES * seen.slip[visit]))
         if len(fast):  # free at the beginning of what this speed is of
             there, most = way[fast[-1]], float(way.max())
             found.append(most - DEEPER * (most - float(there)))
