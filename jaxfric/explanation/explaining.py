@@ -104,6 +104,12 @@ def _explain(
     known = _known(baseline, seed)
     motion, held = motion_of(recording), None if holdout is None else motion_of(holdout)
     problem = problem_of(motion, known.structure)
+    seen = None if inputs.checked or inputs.free else sanity.stopped(motion, problem, held)
+    if seen is not None and seen.stops:
+        for candidates in problem.candidate_sets:
+            candidates.close()
+        found = _explain(inputs.without(seen.without), simulate, seed, doing)
+        return sanity.with_stops(found, seen, inputs.figures)
     bound = None
     if inputs.checked is None and not inputs.arrived:
         bound = sanity.bounded(motion, problem, known.model, held)
@@ -147,7 +153,7 @@ def _explain(
         models = {"before": explanation.baseline, "after": explanation.model}
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
-    return explanation
+    return sanity.without_visible(explanation) if seen is not None and seen.leans else explanation
 
 
 def _known(baseline, seed: int) -> Baseline:

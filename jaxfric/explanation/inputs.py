@@ -36,7 +36,7 @@ class Inputs(NamedTuple):
     - `figures`: force errors in the caller's precision; `remarks`: about the recordings.
     - `checked`: what was checked before any physics where the baseline is a simulator, whose
       `attributes` are those values that may be wrong; `arrived`: whether the force is what arrived
-      of a command.
+      of a command; `free`: whether samples at a hard stop have been taken out.
     """
 
     recording: Recording
@@ -50,18 +50,27 @@ class Inputs(NamedTuple):
     checked: CheckedSimulator | None
     attributes: Mapping[str, Attribute]
     arrived: bool = False
+    free: bool = False
 
     def cut_off(self, limit: Estimate) -> "Inputs":
         """With what arrives of the command at a limit of the force, N."""
+        return self._each(lambda log: sanity.arrived(log, limit))._replace(arrived=True)
+
+    def without(self, taken: Callable[[Recording], Recording]) -> "Inputs":
+        """Without the samples at a hard stop, which `taken` takes out of a log."""
+        return self._each(taken)._replace(free=True)
+
+    def _each(self, change: Callable[[Recording], Recording]) -> "Inputs":
+        """With all its recordings changed alike, and the figures of these."""
         logs = (self.recording, self.holdout, self.sound, self.sound_holdout)
         recording, holdout, sound, sound_holdout = (
-            None if log is None else sanity.arrived(log, limit) for log in logs
+            None if log is None else change(log) for log in logs
         )
         assert recording is not None and sound is not None
         figures = Figures(recording, holdout, self.figures.x64)
         return self._replace(
             recording=recording, holdout=holdout, sound=sound, sound_holdout=sound_holdout,
-            figures=figures, arrived=True,
+            figures=figures,
         )  # fmt: skip
 
     def in_double_precision(self) -> tuple[Recording, Recording | None, Any]:

@@ -13,5 +13,7 @@ from .checked import (
     with_checks as with_checks,
 )
 from .limits import arrived as arrived
+from .pressed import stopped as stopped
 from .rows import rows_of as rows_of
+from .stops import with_stops as with_stops, without_visible as without_visible
 from .table import Check as Check
