@@ -14,7 +14,6 @@ from ...identification.uncertainty import Estimate
 from ...simulation.errors import outliers
 from ...simulators import AbstractSimulator, Attribute, Mujoco
 from ...simulators.columns import GAIN
-from ...terms.effects import EFFECTS
 from ..explained import Explanation
 from ..figures import Figures, cast
 from ..finding import Finding
@@ -23,7 +22,7 @@ from .contact import Contact, contacts
 from .faults import Faults, FaultSearch, find_each, put_right
 from .preceding import p_value, with_preceding
 from .rows import Part, Rows, rows_of
-from .table import REPORTED, Check, checks_of
+from .table import EQUATIONS, Check, checks_of
 
 # Said of a force that stays at the end of its range.
 CLIPPED = "force_clipped"
@@ -210,7 +209,7 @@ def _findings(checked: CheckedSimulator) -> list[Finding]:
     share = 1 - after / before if before > 0 else 0.0
     found = []
     for check in checked.checks:
-        if not check.wrong or check.effect not in REPORTED:
+        if not check.wrong or check.effect not in EQUATIONS:
             continue
         value = check.value
         part = share if check.share is None else check.share
@@ -218,7 +217,7 @@ def _findings(checked: CheckedSimulator) -> list[Finding]:
         chance = 0.0 if check.share is not None else p_value(value)
         found.append(
             Finding(
-                check.effect, EFFECTS[check.effect].equation, f"{check.text} {part:.0%} of the "
+                check.effect, EQUATIONS[check.effect], f"{check.text} {part:.0%} of the "
                 "unexplained force goes with it.", check.confusable, check.separate_by,
                 {check.parameter: value}, part, None, chance, attribute=check.attribute,
             )

@@ -238,5 +238,7 @@ def _ends(part: Part) -> list[Check]:
     return [Check("joint_limit", text, bool(said))]
 
 
-# What is reported as a finding.
-REPORTED = (POSITION_ZERO.name, CLOCK.name, FORCE_LIMIT.name, END_STOP.name)
+# Of what is reported as a finding; a hard stop has no stiffness.
+EQUATIONS = {each.name: each.equation for each in (POSITION_ZERO, CLOCK, FORCE_LIMIT)} | {
+    END_STOP.name: "x ≤ x_s, or x ≥ x_s"
+}
