@@ -51,10 +51,13 @@ def expected_noise(machine):
     return float(np.hypot(machine.noise.force, machine.noise.process))
 
 
-# A wrong parameter belongs to a model, not to a machine; machines whose mass or gain changes while
-# they run are not drawn yet: tests/test_moments.py plants those.
+# A wrong parameter and a zero belong to a model, not to a machine, and a hard limit is a definition
+# of saturation; machines whose mass or gain changes while they run are not drawn yet:
+# tests/test_moments.py plants those.
 NOT_DRAWN = {
     "parameter_mismatch",
+    "position_zero",
+    "force_limit",
     "payload_change",
     "gain_step",
     "parameter_step",
