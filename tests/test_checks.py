@@ -363,6 +363,7 @@ def result(found):
     return result_names()[int(found.result._value)]
 
 
+@pytest.mark.slow
 def test_what_is_certain_to_be_wrong_is_not_successful():
     sound = log()
     rng = np.random.default_rng(1)

@@ -356,13 +356,9 @@ def test_a_late_force_is_a_delay_and_nothing_else(healthy):
     assert float(delay.value) == pytest.approx(6e-3, abs=1.1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("effect", "time"),
-    [
-        pytest.param("clock", 4e-3, marks=pytest.mark.slow),
-        pytest.param("sensor_filter", 3e-3, marks=pytest.mark.slow),
-        ("sensor_filter", 0.02),
-    ],
+    ("effect", "time"), [("clock", 4e-3), ("sensor_filter", 3e-3), ("sensor_filter", 0.02)]
 )
 def test_a_force_that_is_recorded_late_is_the_log_s(healthy, effect, time):
     """Not of the machine: as a compliance it was named, with a tone beside it."""
@@ -933,6 +929,7 @@ def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):
     assert [f.effect for f in told.findings] == ["load_drift"]
 
 
+@pytest.mark.slow
 def test_two_effects_that_hide_each_other_are_both_found(healthy, monkeypatch):
     """A step near the end of a record in which the machine warms: neither alone is significant."""
     warming = terms.ThermalDrift(terms.Coulomb())

@@ -289,6 +289,7 @@ def test_single_precision_is_sane(name):
             assert gap <= 0.3 * float(estimate.standard_error) + 1e-3 * abs(float(estimate.value))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "points",
     [pytest.param(None, id="nodes"), pytest.param(64, id="samples", marks=pytest.mark.slow)],
