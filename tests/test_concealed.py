@@ -18,7 +18,7 @@ from jaxfric.validation.proof import planning
 
 SIZE = 0.12
 # Where a lag makes the force differ most, at a reversal, its size does not count (slip alone does).
-IN_SLIP = {"transport_delay", "actuator_lag", "position_dependent_delay"}
+IN_SLIP = {"transport_delay", "actuator_lag", "position_dependent_delay", "clock", "sensor_filter"}
 
 
 def quick(seed, effects=(), size=SIZE):
