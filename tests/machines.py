@@ -12,7 +12,8 @@ import jaxfric as jf
 from jaxfric import signals
 from jaxfric.identification.projections import WeakForm
 from jaxfric.models import weighed
-from jaxfric.simulation.prediction import at_once, later, with_channels
+from jaxfric.simulation.lateness import at_once, later
+from jaxfric.simulation.prediction import with_channels
 
 PERIOD = 4.0
 

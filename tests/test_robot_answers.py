@@ -67,9 +67,9 @@ def test_friction_by_the_whole_force_is_no_torque_constant(gain, told):
         ),
         Finding("parameter_mismatch", "", "", (), "", values, 0.1, None, 0.002),
     ]
-    left = attributes._without_load_s_gain(findings)
+    left = attributes._without_gain_by_load(findings)
     assert left[:1] == findings[:1] and len(left) == 1 + told
-    assert attributes._without_load_s_gain(findings[1:]) == findings[1:]
+    assert attributes._without_gain_by_load(findings[1:]) == findings[1:]
 
 
 def test_a_value_that_nothing_can_have_is_not_told_as_the_right_one():

@@ -15,10 +15,11 @@ from hypothesis import given, settings, strategies as st
 from jaxfric import models, terms
 from jaxfric.data.recording import Recording
 from jaxfric.simulation.control import PD, PID, Cascade, Encoder
+from jaxfric.simulation.lateness import at_once
 from jaxfric.simulation.prediction import predict
 from jaxfric.simulation.simulating import simulate
 from jaxfric.simulation.substeps import default_substeps
-from jaxfric.terms import AbstractLaw, Parameter, SensorFilter, TransportDelay
+from jaxfric.terms import AbstractLaw, ClockOffset, Parameter, SensorFilter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
 from tests.machines import relative_error
 
@@ -340,6 +341,16 @@ def test_emps_in_closed_loop_meets_the_published_simulation_error():
     force = jnp.linalg.norm(out.force - recording.force) / jnp.linalg.norm(recording.force)
     assert float(position) < 0.0004
     assert float(force) < 0.08
+
+
+def test_a_delay_and_a_clock_that_is_as_late_cancel():
+    term = models.coulomb_viscous() + TransportDelay() + ClockOffset()
+    values = dict.fromkeys((p.name for p in term.affine), 1.0)
+    for clock, left in ((0.004, 0.0), (0.001, 0.003)):
+        model = models.from_parameters(term, values | {"delay": 0.004, "clock_offset": clock})
+        rest, delay = at_once(model)
+        assert float(delay) == pytest.approx(left, abs=1e-12)
+        assert float(rest.parameters["delay"]) == float(rest.parameters["clock_offset"]) == 0.0
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
 
     The model keeps the corrections, which are zero where the simulator is right.
     """
-    told = dataclasses.replace(told, findings=_without_load_s_gain(told.findings))
+    told = dataclasses.replace(told, findings=_without_gain_by_load(told.findings))
     rate = float(told.recording["sample_rate"])
     own = {key: a._replace(between=1 / rate) if a.unit == "s" else a for key, a in own.items()}
     findings = [_reworded(f, own) if f.effect == MISMATCH else f for f in told.findings]
@@ -44,7 +44,7 @@ def in_own_words(told: Explanation, own: Mapping[str, Attribute]) -> Explanation
     return dataclasses.replace(told, findings=findings, baseline_parameters=values, verdict=verdict)
 
 
-def _without_load_s_gain(findings: Sequence[Finding]) -> list[Finding]:
+def _without_gain_by_load(findings: Sequence[Finding]) -> list[Finding]:
     """The findings without a gain that friction by the motor's own force makes.
 
     Of u = f + μ abs(u) sign v, by the whole force, all is 1/(1 − μ²) times what it is of

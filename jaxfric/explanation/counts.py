@@ -7,9 +7,12 @@ from .. import signals
 from ..data.excerpt import MOST
 from ..simulation.prediction import Prepared
 
-# The answer to a count is looked for among so many samples before and after it: a loop that is
-# slower answers the motion that is seen.
+# The answer to a count is looked for among so many samples before and after it: it is over within a
+# few cycles of the controller (12 took 66 %, 24 took 68 % of a residual), and a slower loop answers
+# the motion that is seen.
 LAGS = 24
+# Samples that are enough for as many numbers as there are lags.
+ENOUGH = 1 << 16
 # A rounding error is half a count at most, and the smooth motion's own error as much: what differs
 # by more is motion.
 ROUNDED = 1.0
@@ -42,6 +45,9 @@ def answered(
     calm = inner & (np.convolve(moved, np.ones(2 * LAGS + 1), "same") < 0.5)
     if np.count_nonzero(calm) < 0.5 * np.count_nonzero(inner) or not calm.any():
         return 0.0
-    lags = np.stack([np.roll(error, lag)[calm] for lag in range(-LAGS, LAGS + 1)], axis=1)
-    answer = lags @ np.linalg.lstsq(lags, rest[calm], rcond=None)[0]
-    return float(answer @ answer / max(float(rest[inner] @ rest[inner]), 1e-300))
+    chosen = np.flatnonzero(calm)
+    chosen = chosen[:: -(-len(chosen) // ENOUGH)]
+    lags = error[chosen[:, None] + np.arange(-LAGS, LAGS + 1)]
+    answer = lags @ np.linalg.lstsq(lags, rest[chosen], rcond=None)[0]
+    share = np.count_nonzero(calm) / len(chosen)
+    return float(share * (answer @ answer) / max(float(rest[inner] @ rest[inner]), 1e-300))

@@ -13,7 +13,8 @@ from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model, require as require_model
-from .prediction import Prepared, at_once, forces, later, located, samples_of
+from .lateness import at_once, later
+from .prediction import Prepared, forces, located, samples_of
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:

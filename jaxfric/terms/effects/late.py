@@ -63,6 +63,7 @@ class SensorFilter(AbstractRecordedLate):
     affine: ClassVar = (Parameter("filter_time", TIME),)
 
 
+UNFILTERED = "Excite faster: a filter takes off the fast parts of a force, another clock none."
 FASTER = "Excite faster: a delay turns the phase without bound, a lag by a quarter turn."
 
 
@@ -161,7 +162,7 @@ CLOCK = Effect(
     coordinates=("force_rate",),
     needs=frozenset({"predicted_force"}),
     confusable_with=("sensor_filter", "frictional_lag", "compliance"),
-    separate_by="Excite faster: a filter takes off the fast parts of a force, another clock none.",
+    separate_by=UNFILTERED,
     positive=True,
     first_order=True,
     sharp=True,
@@ -181,7 +182,7 @@ SENSOR_FILTER = Effect(
     coordinates=("force_rate",),
     needs=frozenset({"predicted_force"}),
     confusable_with=("clock", "frictional_lag", "compliance"),
-    separate_by="Excite faster: a filter takes off the fast parts of a force, another clock none.",
+    separate_by=UNFILTERED,
     positive=True,
     first_order=True,
     sharp=True,
