@@ -15,16 +15,7 @@ NO_EVIDENCE = 0.9
 
 
 def simplest(best: Finalist, round_: Contest) -> Finalist:
-    """The best, or a law of the same with fewer parameters that does nearly as well.
-
-    Of its own effect, one that cannot be told from it: on a turning axis gravity repeats once per
-    revolution, and a period of its own finds no more. Of reversals, another idealisation.
-    """
-
-    def plain(other: Finalist) -> bool:
-        same = other.effect.name == best.effect.name and not other.effect.by_parameter
-        fewer = len(other.betas[-1]) < len(best.betas[-1])
-        return same and fewer and other.p_value <= LEVEL and other.score > best.score - RIVAL
+    """The best, or an idealisation of the same with fewer parameters that does nearly as well."""
 
     def enough(other: Finalist) -> bool:
         effect = other.effect
@@ -33,7 +24,7 @@ def simplest(best: Finalist, round_: Contest) -> Finalist:
         return known and fewer and other.score >= NO_EVIDENCE * best.score
 
     if not best.effect.at_reversals:
-        return next(filter(plain, round_.finalists), best)
+        return best
     return next((other for other in round_.finalists if enough(other)), best)
 
 
