@@ -112,5 +112,6 @@ def test_what_is_none_beside_the_base_s_own_values_is_not_reported():
     for finding in told.findings:
         sizes = [e.interval() for e in finding.parameters.values() if hasattr(e, "interval")]
         assert any(low * high > 0 for low, high in sizes), finding.sentence
-    # Friction by the force of inertia has a part of it.
-    assert told.verdict == "partly_explained" and told.not_confirmed
+    # Friction by the force of inertia has a part of it, the rest is said to be left.
+    assert told.verdict == "partly_explained" and told.where
+    assert {each.effect for each in told.findings} <= {"load_dependent_friction"}
