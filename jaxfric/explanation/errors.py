@@ -13,6 +13,7 @@ from .evidence import gather
 from .figures import Figures, cast
 from .findings import Findings, Solution
 from .improvement import Improved
+from .locate import Structure
 from .mismatch import SURE
 from .motion import motion_of
 from .predictions import with_predictions
@@ -39,8 +40,13 @@ def filtered_errors(findings: Findings, first: Fit) -> dict[str, Any]:
     }
 
 
-def document(better: Improved, filtered: dict, model: Model, figures: Figures) -> dict:
-    """The document's errors: those of `predict` and a subtraction, and those through the kernel."""
+def document(
+    better: Improved, filtered: dict, model: Model, figures: Figures, tone: Structure | None = None
+) -> dict:
+    """The document's errors: those of `predict` and a subtraction, and those through the kernel.
+
+    `tone`: one that is left and is no noise.
+    """
 
     def pair(before, after):
         return None if before is None else {"before": before, "after": after}
@@ -55,7 +61,7 @@ def document(better: Improved, filtered: dict, model: Model, figures: Figures) -
         "holdout_refitted_error": refitted["error"],
         "holdout_values": refitted["values"],
         "simulation_error": None,
-        "noise_floor": figures.floor(model, 2 * reach),
+        "noise_floor": figures.floor(model, 2 * reach, tone),
         "filtered_force_error": filtered["force_error"]
         | {
             "width": reach,

@@ -216,7 +216,8 @@ def gather(
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
     # Of a position that comes seldom no two nodes lie between the same two updates.
-    width = max(int(half_width or _usual(prepared)), half * motion.recording.position_every)
+    usual = half_width or _usual(prepared, limits.slowest)
+    width = max(int(usual), half * motion.recording.position_every)
     prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
     step = max(1, round(width / half))
     span = float(step * half * limits.interval)
@@ -257,9 +258,26 @@ def gather(
     )
 
 
-def _usual(prepared: Recording) -> int:
-    """The half-width of the kernel, in samples, that a prepared recording suggests."""
-    return min(signals.kernel_half_width(prepared), _widest(prepared))
+def _usual(prepared: Recording, slowest: float) -> int:
+    """The half-width of the kernel, in samples, that a prepared recording suggests.
+
+    Noise may ask for a few samples only. Of a fast log that is more nodes than anything needs.
+    """
+    by_noise = min(signals.kernel_half_width(prepared), _widest(prepared))
+    count = int(np.count_nonzero(np.asarray(prepared.mask)))
+    return max(by_noise, min(NODES * count // ENOUGH, _stroke(prepared, slowest) // STROKE))
+
+
+# Nodes that are enough, some four thousand rows whatever the rate: hundreds for each parameter of
+# a model. They are made fewer by a wider kernel, but of no more than a thirty-second of a stroke.
+ENOUGH, STROKE = 3 << 12, 64
+
+
+def _stroke(recording: Recording, slowest: float) -> int:
+    """How many samples the axis slips in one direction, in the mean."""
+    speed = np.asarray(recording.velocity)[np.asarray(recording.mask)]
+    side = np.sign(speed[np.abs(speed) > slowest])
+    return len(side) // (1 + np.count_nonzero(np.diff(side)))
 
 
 # Nodes at most, some ten thousand rows: columns of all candidates at more would fill the memory,
@@ -272,7 +290,8 @@ def shortened(recording: Recording) -> Recording:
     if recording.num_samples <= SPARE * LONGEST:
         return recording
     motion = motion_of(excerpt(recording))
-    most = LONGEST * max(1, round(_usual(motion.padded) / NODES))
+    slowest = float(signals.host_scales(motion.padded)[0].slowest)
+    most = LONGEST * max(1, round(_usual(motion.padded, slowest) / NODES))
     return excerpt(recording, min(most, MOST))
 
 

@@ -13,7 +13,7 @@ from ..identification.identified import Identified
 from ..models import Model, named
 from ..simulators import AbstractSimulator
 from ..terms.base import AbstractTerm
-from . import parameters as spelled, sanity, threads, zero
+from . import beyond, parameters as spelled, sanity, threads, zero
 from .attributes import in_own_words
 from .baseline import Baseline, at_values, baseline_of
 from .doubts import contradicted
@@ -29,7 +29,7 @@ from .motion import Motion, motion_of
 from .parsimony import instead
 from .problem import Problem, problem_of, with_holdout
 from .search import at_given, nothing, obeying, searched
-from .summary import facts, summarise
+from .summary import facts, summarise, tone_left
 from .uncertainty import estimated
 
 
@@ -132,7 +132,7 @@ def _explain(
     if any(remark.severe for remark in remarks):
         wrong, better = _unjudged(known, nothing(problem), inputs, doing, seed)
     else:
-        wrong, better = _found(known, motion, problem, inputs, seed, doing)
+        wrong, better = _with_tone(known, motion, problem, inputs, seed, doing)
     if held is not None:
         doing("validating on the held-out recording")
         check_signals(better.findings.selection, recording, holdout)
@@ -168,6 +168,28 @@ def _contradictions(problem: Problem) -> list[Remark]:
     units = problem.evidence.motion.unit_names
     remark = contradicted(problem, spelled.estimates(problem.base, problem.block, units)[0])
     return [] if remark is None else [remark]
+
+
+def _with_tone(
+    known: Baseline, motion: Motion, problem: Problem, inputs: Inputs, seed: int,
+    doing: Callable[[str], None],
+) -> tuple[Mismatch | None, Improved]:  # fmt: skip
+    """What is missing, through a narrower kernel where a tone is left that this one does not pass.
+
+    Through that the noise is larger: it counts if it shows the tone and all that this one shows.
+    """
+    found = wrong, better = _found(known, motion, problem, inputs, seed, doing)
+    tone = tone_left(better.findings, inputs.figures)
+    width = None if tone is None else beyond.half_width(tone, problem.evidence)
+    if width is None:
+        return found
+    for candidates in problem.candidate_sets:
+        candidates.forget()
+    narrow = problem_of(motion, problem.structure, half_width=width)
+    again = _found(known, motion, narrow, inputs, seed, doing)
+    names = set(better.findings.selection.names)
+    same = names <= set(again[1].findings.selection.names)
+    return again if same and again[1].after.here < better.after.here else found
 
 
 def _found(

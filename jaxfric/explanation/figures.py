@@ -15,7 +15,9 @@ from ..data.recording import Recording
 from ..models import Model
 from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
 from ..simulation.prediction import Prepared
+from .beyond import Samples
 from .counts import answered
+from .locate import Structure
 
 # Parts of a record that are compared: none shares more than its ends with another.
 PARTS = 16
@@ -135,11 +137,18 @@ class Figures:
             self._known[key] = left
         return left
 
-    def floor(self, model: Model, lag: float) -> float:
+    def samples(self, model: Model) -> Samples:
+        """What a model leaves of the recording, sample by sample."""
+        counted, force = self._samples("here", delay_of(model))
+        time = np.asarray(self._recordings["here"].time, float)
+        return Samples(self._left(model, "here"), force, time, counted)
+
+    def floor(self, model: Model, lag: float, tone: Structure | None = None) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
 
-        What is so far apart differs by noise and by what changes faster (von Neumann 1941). No less
-        than counts of the force make, and with what the loop makes of the encoder's, in bursts.
+        What is so far apart differs by noise and by what changes faster (von Neumann 1941), but for
+        a `tone`. No less than counts of the force make, and with what the loop makes of the
+        encoder's, in bursts.
         """
         recording = self._recordings["here"]
         moving, force = self._samples("here", delay_of(model))
@@ -150,6 +159,8 @@ class Figures:
             count = max(1, round(lag / float(np.median(steps, overwrite_input=True))))
         del steps
         rest = self._left(model, "here")
+        whole = relative(rest, force, moving)
+        rest = rest if tone is None else self.samples(model).without(tone)
         both = moving[count:] & moving[:-count]
         if not both.any():
             return float("nan")
@@ -161,6 +172,7 @@ class Figures:
             noise = max(noise, step / np.sqrt(12))
         total = power(force, moving)
         alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
-        whole = relative(rest, force, moving)
-        counted = whole * np.sqrt(answered(rest, moving, self._motion("here")))
+        counted = relative(rest, force, moving) * np.sqrt(
+            answered(rest, moving, self._motion("here"))
+        )
         return min(float(np.hypot(alone, counted)), whole)  # noise is no more than all of it

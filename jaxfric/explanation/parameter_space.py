@@ -7,6 +7,11 @@ import numpy as np
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
+# Steps for derivatives, of a coordinate from 0 to 1: within one the energy is a straight line. Of a
+# wave with five hundred cycles over the record, whose coordinate spans e⁷, the phase at the end
+# moves by 2π · 500 · 7 times as much.
+STEP, OF_WAVES = 1e-4, 1e-7
+
 
 class Space:
     """The compact set of the nonlinear parameters of some terms, in coordinates from 0 to 1."""
@@ -17,6 +22,7 @@ class Space:
         self.counts = [len(term.nonlinear) for term in terms]
         parameters = [p for term in terms for p in term.nonlinear]
         self.log = np.array([p.logarithmic for p in parameters], bool)
+        self.step = np.array([OF_WAVES if p.repeats else STEP for p in parameters])
         box = np.concatenate(boxes, axis=1)
         self.low = np.where(self.log, np.log(np.where(self.log, box[0], 1.0)), box[0])
         self.high = np.where(self.log, np.log(np.where(self.log, box[1], 1.0)), box[1])

@@ -80,15 +80,19 @@ class Problem(NamedTuple):
 
 
 def problem_of(
-    recording: Recording | Motion, structure: AbstractTerm, before: Problem | None = None
+    recording: Recording | Motion,
+    structure: AbstractTerm,
+    before: Problem | None = None,
+    half_width: int | None = None,
 ) -> Problem:
     """The regression problem of a recording, force and motion aligned.
 
     **Arguments:** `before`: a problem of the same motion and baseline, whose columns serve again if
-    only the force has been shifted.
+    only the force has been shifted; `half_width` of the kernel, in samples, where the usual one is
+    too wide.
     """
     motion = motion_of(recording)
-    evidence = gather(motion)
+    evidence = gather(motion, half_width)
     if before is not None:
         return _aligned(motion, evidence, structure, before.candidate_sets)
     candidates = CandidateSet(evidence, structure)

@@ -237,8 +237,8 @@ def without(current: Fit, evidence: Evidence, number: int) -> Fit:
 def _at(terms, evidence, space, point, derivatives=False) -> Fit:
     """The fit at given coordinates of β; with the derivatives by the coordinates' β."""
     betas = space.split(space.beta(point))
-    step = 1e-4
-    shifted = space.split(space.beta(np.where(point + step > 1.0, point - step, point + step)))
+    beyond = point + space.step > 1.0
+    shifted = space.split(space.beta(point + np.where(beyond, -space.step, space.step)))
     columns, moved = [], []
     for number, term in enumerate(terms):
         own, changed = betas[number], changed_columns(term)

@@ -102,7 +102,8 @@ def _put_back(
 ) -> Solution:
     """The terms selected once a late force is put back."""
     undone = lateness.undone(motion)
-    again = problem_of(undone, found.problem.structure, before=found.problem)
+    before = found.problem
+    again = problem_of(undone, before.structure, before, before.evidence.width)
     return aligned(undone, again, seed, refused)
 
 

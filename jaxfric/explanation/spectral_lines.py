@@ -177,22 +177,31 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     series = np.zeros(OVERSAMPLING * (int(cell[-1]) + 1))
     series[cell] = current.residual
     tones = np.fft.rfftfreq(len(series), 0.5 / top)
-    above = tones > scanned
-    power, tones = np.abs(np.fft.rfft(series)[above]) ** 2, tones[above]
-    near = OVERSAMPLING * NEIGHBOURS
-    parts = len(power) // near
-    if not parts:
+    best = standing_out(tones, np.abs(np.fft.rfft(series)) ** 2, scanned)
+    if best is None:
         return _NONE
-    part = np.minimum(np.arange(len(power)) // near, parts - 1)
-    noise = np.median(power[: parts * near].reshape(parts, near), axis=1) / np.log(2)
-    ratio = power / np.maximum(noise[part], 1e-300)
-    best = int(np.argmax(ratio))
     tone = tones[best]
-    if np.exp(-ratio[best]) * len(ratio) > LEVEL or shared(np.array([tone]), evidence)[0] >= OWN:
+    if shared(np.array([tone]), evidence)[0] >= OWN:
         return _NONE
     steps = (tones[1] - tones[0]) * np.arange(-2, 3)
     found = max([*(tone + steps), *(2 * top - tone + steps)], key=lambda f: _at_nodes(f, evidence))
     return found + steps[(found + steps > top) == (found > top)]
+
+
+def standing_out(tones: np.ndarray, power: np.ndarray, above: float) -> int | None:
+    """The number of the ordinate that stands out most of its neighbours, of tones `above` one, Hz;
+    `None` where none does by more than chance.
+    """
+    first, near = int(np.searchsorted(tones, above, "right")), OVERSAMPLING * NEIGHBOURS
+    power = power[first:]
+    parts = len(power) // near
+    if not parts:
+        return None
+    part = np.minimum(np.arange(len(power)) // near, parts - 1)
+    noise = np.median(power[: parts * near].reshape(parts, near), axis=1) / np.log(2)
+    ratio = power / np.maximum(noise[part], 1e-300)
+    best = int(np.argmax(ratio))
+    return None if np.exp(-ratio[best]) * len(ratio) > LEVEL else first + best
 
 
 def _at_nodes(tone: float, evidence: Evidence) -> float:

@@ -9,7 +9,7 @@ from ..checks import MATTERS, Remark
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
-from . import parameters as spelled, structure, verification
+from . import beyond, parameters as spelled, structure, verification
 from .acceptance import LINEARITY
 from .baseline import Baseline
 from .curves import curves
@@ -18,7 +18,9 @@ from .errors import document, filtered_errors
 from .explained import Explanation
 from .figures import Figures
 from .finding import Finding
+from .findings import Findings
 from .improvement import Improved, holdout_model
+from .locate import Structure
 from .mismatch import Mismatch
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, wrong_values
@@ -58,11 +60,15 @@ def summarise(
     filtered = filtered_errors(better.findings, better.first)
     if not any(remark.severe for remark in remarks):
         remarks = [*remarks, *_doubts(better)]
-    errors = document(better, filtered, models[1], figures)
+    tone = tone_left(better.findings, figures)
+    errors = document(better, filtered, models[1], figures, tone)
     apart = _elsewhere(errors)
     remarks = [*remarks, *apart]
+    tones = [] if tone is None else [tone]
+    remarks += [beyond.remark(each, figures.samples(models[1])) for each in tones]
     new, later = (
-        [s for s in some if s.coordinate not in known.structured] for some in (before.counts, after)
+        [s for s in some if s.coordinate not in known.structured] + tones
+        for some in (before.counts, after)
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(selection, filtered)
@@ -77,7 +83,8 @@ def summarise(
     seen = better.dropped if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     verdict = verdict_of(findings, new, later, much, standing, remarks, seen)
-    where = structure.documents(before.counts, findings, better.first, units, known.structured)
+    there = [*before.counts, *tones]
+    where = structure.documents(there, findings, better.first, units, known.structured)
     if verdict == "unexplained" and not where:
         where = structure.strongest(before, units, known.structured)
     shown = curves(before.counts[:6], better, models)
@@ -97,6 +104,14 @@ def summarise(
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if problem.held is None else holdout_model(better.findings),
     )
+
+
+def tone_left(findings: Findings, figures: Figures) -> Structure | None:
+    """A tone too fast for the rows that the model with the findings leaves."""
+    selection = findings.selection
+    samples = figures.samples(findings.model(selection.last))
+    before = figures.samples(findings.model(selection.base)) if selection.selected else None
+    return beyond.tone_beyond(samples, findings.problem.evidence, before)
 
 
 def _halvable(selection: Selection, filtered: Mapping[str, Any]) -> bool:

@@ -15,6 +15,10 @@ from .findings import Findings
 from .regression import Fit, at_shapes, freed
 from .significance import evenly
 
+# A wider kernel that passes less than this part of a term's force says nothing of it: what other
+# laws lack, a hundredth of theirs, would be a tenth of it.
+PASSES = 0.1
+
 
 class Estimates(NamedTuple):
     """The parameters of one term by three sets of rows, with each one's own errors.
@@ -74,10 +78,13 @@ def by_rows(
         }
         for term in ours[count:]
     ]
-    wide: list[dict[str, Estimate]] = []
+    wide: list[dict[str, Estimate] | None] = []
     if problem.wide is not None:
         current, block = again(problem.wide, others.last)
-        wide = spelled.estimates(current, block, units)
+        values = spelled.estimates(current, block, units)
+        forces = [_sizes(each) for each in (current, others.last)]
+        pairs = zip(values, *forces, strict=True)
+        wide = [own if through >= PASSES * all_of_it else None for own, through, all_of_it in pairs]
     there: dict[int, dict[str, Estimate]] = {}
     if problem.held is not None:
         # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
@@ -86,3 +93,9 @@ def by_rows(
         there = {id(term): each for term, each in zip(lasting.terms, values, strict=True)}
     both = zip_longest(ours[:count], wide, map(there.get, map(id, others.last.terms)))
     return [Estimates(*each) for each in both] + [Estimates(each) for each in late]
+
+
+def _sizes(current: Fit) -> list[float]:
+    """The root mean square of each term's force over the rows, N."""
+    parts = [current.part(number) for number in range(len(current.terms))]
+    return [float(np.sqrt(np.mean(part**2))) for part in parts]

@@ -1,0 +1,111 @@
+"""Tones that are faster than the kernel of the rows lets through: sought in the samples.
+
+No row shows them, so that a residual which is such a tone would pass for noise.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ..checks import Remark
+from ..data.excerpt import MOST, SPARE
+from .acceptance import LEAST_SHARE, LINEARITY, OF_BASE
+from .evidence import LONGEST, Evidence
+from .locate import Structure
+from .nodes import NODES
+from .significance import BLOCKS, DRAWS, LEVEL, evenly
+from .spectral_lines import NEIGHBOURS, OVERSAMPLING, SPARSE, line_frequencies, standing_out
+
+# A tone has this part of the power of all that stands out within a tenth of its frequency: the
+# ringing after every reversal of a periodic motion is a comb of many, as wide as its damping.
+ALONE, NEAR = 0.5, 0.1
+
+
+class Samples(NamedTuple):
+    """What a model leaves of the force, sample by sample, `(N,)` each.
+
+    `rest` and `force`, N; `time`, s; `counted`: which samples a force error is taken over.
+    """
+
+    rest: Float[np.ndarray, " N"]
+    force: Float[np.ndarray, " N"]
+    time: Float[np.ndarray, " N"]
+    counted: Bool[np.ndarray, " N"]
+
+    def without(self, tone: Structure) -> np.ndarray:
+        """What is left without a tone, N, `(N,)`."""
+        turned = 2 * np.pi * tone.peak * (self.time - self.time[0])
+        waves = np.stack([np.sin(turned), np.cos(turned)], axis=1)
+        size = np.linalg.lstsq(waves[self.counted], self.rest[self.counted], rcond=None)[0]
+        return self.rest - waves @ size
+
+
+def tone_beyond(
+    samples: Samples, evidence: Evidence, before: Samples | None = None, seed: int = 0
+) -> Structure | None:
+    """The strongest tone above those that the rows are scanned for, if it counts as structure does.
+
+    It stands out of its neighbours in the spectrum (Fisher 1929), and random signs of the blocks do
+    not do as well: what rings or hums now and then is no tone. `before`: what is left without the
+    findings; of the amplitude of that a tenth may remain.
+    """
+    rest, force, time, counted = (values[:MOST] for values in samples)
+    if np.count_nonzero(counted) < BLOCKS * NEIGHBOURS or not evidence.clock:
+        return None
+    cell = np.round((time - time[0]) / np.median(np.diff(time))).astype(int)
+    if cell[-1] > SPARSE * len(cell):
+        return None
+    rest, time, cell = rest[counted], time[counted], cell[counted]
+    series = np.zeros(OVERSAMPLING * (int(cell[-1]) + 1))
+    series[cell] = rest
+    tones = np.fft.rfftfreq(len(series), float(np.median(np.diff(samples.time[:MOST]))))
+    power = np.abs(np.fft.rfft(series)) ** 2
+    best = standing_out(tones, power, line_frequencies(evidence, "time")[-1])
+    if best is None or not _alone(power, best):
+        return None
+    tone, block = float(tones[best]), evenly(len(rest), BLOCKS)
+    waves = rest * np.exp(-2j * np.pi * tone * time)
+    scores = np.bincount(block, waves.real, BLOCKS) + 1j * np.bincount(block, waves.imag, BLOCKS)
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(DRAWS, BLOCKS))
+    p_value = float((1 + np.sum(np.abs(signs @ scores) >= abs(scores.sum()))) / (1 + DRAWS))
+    size = float(abs(scores.sum())) * np.sqrt(2) / len(rest)
+    share = size**2 / float(np.mean(rest**2))
+    least = LINEARITY * float(np.sqrt(np.mean(force[counted] ** 2)))
+    if before is not None:
+        mismatch = before.rest[:MOST][counted]
+        least = max(least, OF_BASE**0.5 * float(np.sqrt(np.mean(mismatch**2))))
+    if p_value > LEVEL or share < LEAST_SHARE or size < least:
+        return None
+    return Structure("time_lines", share, size, p_value, tone, (np.zeros(0), np.zeros(0)))
+
+
+def _alone(power: np.ndarray, best: int) -> bool:
+    """Whether most of what stands out about a tone is the tone."""
+    first = best - int(NEAR * best)
+    around = power[first : best + int(NEAR * best) + 1]
+    noise = np.median(around) / np.log(2)
+    stands = np.where(around > noise * np.log(len(around) / LEVEL), around, 0.0)
+    own = slice(best - first - OVERSAMPLING, best - first + OVERSAMPLING + 1)
+    return bool(stands[own].sum() >= ALONE * stands.sum())
+
+
+def half_width(tone: Structure, evidence: Evidence) -> int | None:
+    """Half the width, in samples, of a kernel whose rows show a tone; `None` if there is none.
+
+    It takes six samples each way and more, and no more nodes than a search can do with.
+    """
+    step = int(np.ceil(1 / (tone.peak * float(evidence.limits.interval) * NODES))) - 1
+    nodes = evidence.nodes * evidence.width / (NODES * max(step, 1))
+    return NODES * step if step >= 1 and nodes <= SPARE * LONGEST else None
+
+
+def remark(tone: Structure, samples: Samples) -> Remark:
+    """That a tone is left which no effect was looked for at."""
+    force = float(np.sqrt(np.mean(samples.force[samples.counted] ** 2)))
+    text = (
+        f"A tone of {tone.peak:.4g} Hz is left, {tone.size / force:.1%} of the force, too fast for "
+        "the search, which named nothing for it: the loop, the drive's supply or something "
+        "that turns hums so. Look for what runs at that frequency, or log at a higher rate."
+    )
+    return Remark("fast_tone", text, False)
