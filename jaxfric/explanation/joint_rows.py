@@ -9,7 +9,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from ..simulators import Mujoco
-from ..simulators.weights import by_gravity, linear
+from ..simulators.weights import by_gravity, linear, pulled
 from ..terms import KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import summands
 from ..terms.effects import traits
@@ -27,8 +27,9 @@ class JointRows(NamedTuple):
     """One joint's rows, divided by its noise, without the span of the physics that was found in it.
 
     - `name` of the joint; `own`: names of its own values, p of them, in the simulator's words.
-    - `columns` `(J, p + 3 + 10 B)`: the force by a unit of its own values, of gravity along each
+    - `columns` `(J, p + 3 + 22 B)`: the force by a unit of its own values, of gravity along each
       axis, and of the ten parameters that the force of each of the model's B bodies is linear in;
+      then of gravity along each axis on a unit of mass and of first moment of each body;
       `target` `(J,)`: what the simulator, as given, leaves; `block` of each row, `(J,)`.
     - `enough`: the energy below which no sensor of force tells anything, in units of the noise's.
     """
@@ -52,7 +53,10 @@ def joint_rows(
     """
     seen = simulator.along(log)
     of = simulator.mujoco, simulator.model, simulator.number, seen
-    parts = [(rest, np.zeros_like(rest)) for rest in by_gravity(*of)] + linear(*of)
+    turned, products = (
+        [(rest, np.zeros_like(rest)) for rest in each(*of)] for each in (by_gravity, pulled)
+    )
+    parts = turned + linear(*of) + products
     names = [name for name in simulator.attributes() if not name.startswith("body/")]
     first = len(simulator.attributes())
     beside = simulator.beside(log)
