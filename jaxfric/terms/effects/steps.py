@@ -199,14 +199,19 @@ def hanging(
     term: PayloadChange, base: AbstractTerm, turn: float | None
 ) -> tuple[AbstractTerm, ...]:
     """On a turning axis the load's weight goes with the angle; of another simulator's axis it is
-    more mass of the last body, which has the load's place. The weight may rest on something else.
+    more mass of the last body, which has the load's place or moves there. The weight may rest on
+    something else.
     """
     for part in summands(base):
-        masses = [i for i, n in enumerate(getattr(part, "names", ())) if n.endswith("/mass")]
+        names = getattr(part, "names", ())
+        masses = [i for i, name in enumerate(names) if name.endswith("/mass")]
         if isinstance(part, KnownColumns) and masses:
-            return (dataclasses.replace(term, load=part.only(masses[-1])),)
+            mass, body = part.only(masses[-1]), names[masses[-1]].rpartition("/")[0]
+            centres = [i for i, name in enumerate(names) if name.startswith(f"{body}/centre_")]
+            loads = [mass, *([Sum((mass, *map(part.only, centres)))] if centres else [])]
+            return tuple(dataclasses.replace(term, load=load) for load in loads)
     weight = Offset() if turn is None else Gravity(turn)
-    loads = Sum((Inertia(), weight)), Inertia()
+    loads = [Sum((Inertia(), weight)), Inertia()]
     return tuple(dataclasses.replace(term, load=load) for load in loads)
 
 
@@ -215,9 +220,14 @@ def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
     mass = next((name for name in values if name.endswith("/mass")), None)
     if mass is not None:
         body = mass.split("/")[1]
-        there = f"if its centre of mass is where that of body {body} is"
         text = f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}"
-        return f"{text}: {PICKED}, {there}"
+        centres = [name for name in values if "/centre_" in name]
+        if not centres:
+            return f"{text}: {PICKED}, if its centre of mass is where that of body {body} is"
+        moved = " and ".join(f"{name[-1]} by {{{name}}}" for name in centres)
+        return (
+            f"{text} and its centre of mass along {moved}, or what makes the same force: {PICKED}"
+        )
     weight = next((name for name in ("amplitude", "payload_offset") if name in values), None)
     if weight is None:
         return None
