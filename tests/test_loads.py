@@ -21,17 +21,20 @@ FORE = Weight(1.2, np.array([0.1, 0.0, 0.0]), np.array([0.002, 0.009, 0.009]), n
 TRUE = np.array([0.5, 0.24, 0.03, -0.02])
 
 
-def test_a_load_changes_a_mass_alone_or_a_centre_too():
-    names = ("joint/elbow/damping", "body/upper/mass", "body/fore/mass", "body/fore/centre_x")
-    base = Sum((KnownColumns(names, ("1",) * 4), Offset()))
-    alone, elsewhere = hanging(PayloadChange(), base, None)
-    assert [p.name for p in alone.affine] == ["payload_body/fore/mass"]
-    assert [p.name for p in elsewhere.affine] == [
-        "payload_body/fore/mass",
-        "payload_body/fore/centre_x",
+def test_a_load_changes_a_mass_alone_or_its_place_too():
+    fore = [f"body/fore/{name}" for name in ("mass", "centre_x", "inertia_y")]
+    names = ("joint/elbow/damping", "body/upper/mass", *fore)
+    base = Sum((KnownColumns(names, ("1",) * len(names)), Offset()))
+    loads_ = hanging(PayloadChange(), base, None)
+    every = [f"payload_{name}" for name in fore]
+    assert [[p.name for p in load.affine] for load in loads_] == [every[:1], every[:2], every]
+    texts = [
+        PAYLOAD_CHANGE.variant(dict.fromkeys([*every[:count], "step_time"], 0.1), None)
+        for count in (1, 2, 3)
     ]
-    values = {"payload_body/fore/mass": 0.3, "payload_body/fore/centre_x": 0.1, "step_time": 2.0}
-    assert "centre of mass along x" in PAYLOAD_CHANGE.variant(values, None)
+    assert texts[0].endswith("if its centre of mass is where that of body fore is")
+    assert "its centre of mass along x by {payload_body/fore/centre_x}, or what" in texts[1]
+    assert "{payload_body/fore/centre_x} and its inertia, or what makes the same" in texts[2]
 
 
 def rows(draw, seen=10):

@@ -206,9 +206,11 @@ def hanging(
         names = getattr(part, "names", ())
         masses = [i for i, name in enumerate(names) if name.endswith("/mass")]
         if isinstance(part, KnownColumns) and masses:
-            mass, body = part.only(masses[-1]), names[masses[-1]].rpartition("/")[0]
-            centres = [i for i, name in enumerate(names) if name.startswith(f"{body}/centre_")]
-            loads = [mass, *([Sum((mass, *map(part.only, centres)))] if centres else [])]
+            body, loads = names[masses[-1]].rpartition("/")[0], [part.only(masses[-1])]
+            for values in ("centre_", "inertia_"):
+                own = [i for i, name in enumerate(names) if name.startswith(f"{body}/{values}")]
+                if own:
+                    loads.append(Sum((*summands(loads[-1]), *map(part.only, own))))
             return tuple(dataclasses.replace(term, load=load) for load in loads)
     weight = Offset() if turn is None else Gravity(turn)
     loads = [Sum((Inertia(), weight)), Inertia()]
@@ -221,13 +223,12 @@ def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
     if mass is not None:
         body = mass.split("/")[1]
         text = f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}"
-        centres = [name for name in values if "/centre_" in name]
-        if not centres:
+        moved = " and ".join(f"{n[-1]} by {{{n}}}" for n in values if "/centre_" in n)
+        turned = any("/inertia_" in name for name in values)
+        if not moved and not turned:
             return f"{text}: {PICKED}, if its centre of mass is where that of body {body} is"
-        moved = " and ".join(f"{name[-1]} by {{{name}}}" for name in centres)
-        return (
-            f"{text} and its centre of mass along {moved}, or what makes the same force: {PICKED}"
-        )
+        text += f" and its centre of mass along {moved}" * bool(moved)
+        return f"{text}{' and its inertia' * turned}, or what makes the same force: {PICKED}"
     weight = next((name for name in ("amplitude", "payload_offset") if name in values), None)
     if weight is None:
         return None
