@@ -218,6 +218,34 @@ def test_a_gravity_of_another_size_is_one_number():
     assert found.values["option/gravity/z"] == pytest.approx(-9.81, abs=0.01)
 
 
+@pytest.mark.parametrize(("value", "error", "told"), [(-9.2, 0.01, True), (-9.2, 0.4, False),
+                                                     (-9.81, 0.001, False)])  # fmt: skip
+def test_gravity_of_a_size_that_it_has_nowhere_stands_for_something_else(value, error, told):
+    robot = rows(arm(), arm())
+    moved = {robot.down: Moved(-9.0, Estimate(np.float64(value), np.float64(error), "m/s²"))}
+    assert agreement._impossible(moved, robot) is told
+    assert not agreement._impossible({}, robot)
+
+
+@pytest.mark.slow
+def test_of_a_gravity_that_is_nowhere_nothing_is_written(tmp_path, capsys, monkeypatch):
+    """As on another planet, where the file's is right."""
+    monkeypatch.setattr(agreement, "EARTH", (8.9, 9.1))
+    (tmp_path / "arm.xml").write_text(standing("0 0 -9"))
+    log(tmp_path / "log.csv", arm(), 1)
+    command = ["explain", str(tmp_path / "log.csv"), "--mujoco", str(tmp_path / "arm.xml")]
+    new, out = str(tmp_path / "new.xml"), str(tmp_path / "out.json")
+    assert cli.main([*command, "--save", new, "--json", out]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "gravity is of that size nowhere: something else is wrong" in said
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert document["patch"]["written"] == []
+    for row in document["joints"]:
+        (finding,) = row["explanation"]["findings"]
+        assert row["verdict"] == "partly_explained" and not finding["parameters"]
+        assert finding["untold"] == ["option/gravity/z"]
+
+
 @pytest.mark.parametrize("text", [arm(), standing("0 1 -9")])
 def test_gravity_is_written_into_the_file_s_option(text):
     done = patched(mujoco, text, {"option/gravity/x": 0.5, "option/gravity/z": -9.8})
