@@ -206,15 +206,16 @@ def hanging(
         names = getattr(part, "names", ())
         masses = [i for i, name in enumerate(names) if name.endswith("/mass")]
         if isinstance(part, KnownColumns) and masses:
-            body, loads = names[masses[-1]].rpartition("/")[0], [part.only(masses[-1])]
+            body = names[masses[-1]].rpartition("/")[0]
+            loads: list[AbstractTerm] = [part.only(masses[-1])]
             for values in ("centre_", "inertia_"):
                 own = [i for i, name in enumerate(names) if name.startswith(f"{body}/{values}")]
                 if own:
                     loads.append(Sum((*summands(loads[-1]), *map(part.only, own))))
             return tuple(dataclasses.replace(term, load=load) for load in loads)
     weight = Offset() if turn is None else Gravity(turn)
-    loads = [Sum((Inertia(), weight)), Inertia()]
-    return tuple(dataclasses.replace(term, load=load) for load in loads)
+    either = Sum((Inertia(), weight)), Inertia()
+    return tuple(dataclasses.replace(term, load=load) for load in either)
 
 
 def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
