@@ -19,20 +19,17 @@ def test_pulses_that_make_the_model_worse_are_no_structure(dropped, verdict):
 
 
 @pytest.mark.parametrize(
-    ("name", "left", "noise"),
-    [("compliance", 0.75, True), ("compliance", 0.4, False), ("cogging", 0.75, False),
-     ("parameter_mismatch", 0.75, False)],
-)  # fmt: skip
-def test_what_follows_the_acceleration_may_be_the_encoder_s_noise(name, left, noise):
+    ("swings", "left", "noise"), [(True, 0.75, True), (True, 0.4, False), (False, 0.75, False)]
+)
+def test_a_load_that_swings_may_be_the_encoder_s_noise(swings, left, noise):
     """Which the controller answers: it is a quarter of a residual at most."""
+    simple = types.SimpleNamespace
+    candidate = simple(term=simple(swings=swings))
+    one = simple(effect=simple(name="load"), trial=simple(candidate=candidate))
 
-    def findings(energy, *names):
-        selected = [types.SimpleNamespace(effect=types.SimpleNamespace(name=n)) for n in names]
-        selection = types.SimpleNamespace(selected=selected, last=types.SimpleNamespace())
-        selection.last.energy = energy
-        return types.SimpleNamespace(
-            undelayed=types.SimpleNamespace(selection=selection),
-            without=lambda number: findings(1.0),
-        )
+    def findings(energy, *selected):
+        selection = simple(selected=selected, last=simple(energy=energy))
+        return simple(undelayed=simple(selection=selection), without=lambda number: findings(1.0))
 
-    assert improvement._as_noise(name, findings(left, name)) is noise
+    assert improvement._as_noise("load", findings(left, one)) is noise
+    assert not improvement._as_noise("parameter_mismatch", findings(left, one))

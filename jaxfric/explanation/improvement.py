@@ -8,7 +8,6 @@ import numpy as np
 
 from ..models import Model
 from ..simulation.errors import delay_of
-from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled, verification
 from .acceptance import HALF
@@ -127,19 +126,17 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
 
 
 def _as_noise(name: str, found: Findings) -> bool:
-    """Whether an effect may be the encoder's noise by the controller's answer, which a column that
-    swings as the acceleration does follows: that noise makes a quarter of a residual at most.
+    """Whether an effect may be the encoder's noise by the controller's answer: of a load that
+    swings faster than a wide kernel resolves. That noise makes a quarter of a residual at most.
     """
-    if name not in EFFECTS or not EFFECTS[name].sharp:
-        return False
     selected = found.undelayed.selection.selected
-    left = found.undelayed.selection.last.energy
-    without = (
-        found.without(n).undelayed.selection.last.energy
-        for n, each in enumerate(selected)
-        if each.effect.name == name
+    own = [n for n, each in enumerate(selected) if each.effect.name == name]
+    most = found.undelayed.selection.last.energy / (1 - HALF)
+    return bool(own) and all(
+        selected[n].trial.candidate.term.swings
+        and found.without(n).undelayed.selection.last.energy < most
+        for n in own
     )
-    return all(left > (1 - HALF) * energy for energy in without)
 
 
 def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
