@@ -6,7 +6,7 @@ import pytest
 from jaxfric import Recording, cli, explain
 from jaxfric.simulators import Mujoco
 from jaxfric.terms import CrossAxis
-from jaxfric.terms.effects.cross_axis import CROSS_AXIS, neighbour_channel
+from jaxfric.terms.effects.cross_axis import CROSS_AXIS, force_channels, neighbour_channel
 from jaxfric.units import DAMPING, DIMENSIONLESS
 
 mujoco = pytest.importorskip("mujoco")
@@ -81,6 +81,16 @@ def test_the_neighbour_that_pulls_is_named(motion):
     drag = finding.parameters["coupling_viscous_x"]
     assert abs(float(drag.value) - 15) < 3 * float(drag.standard_error) + 0.05
     assert "N·s/m times its velocity" in finding.sentence
+
+
+def test_the_dry_friction_of_a_neighbour_is_at_its_limit_as_soon_as_it_slips(motion):
+    """MuJoCo's creeps about a reversal, as no friction of a machine does."""
+    log, _ = recording(motion, 0)
+    simulator = Mujoco(GANTRY.replace('damping="30"', 'damping="30" frictionloss="8"'), "x")
+    seen, channels = simulator.along(log), simulator.beside(log).channels
+    dry = np.asarray(channels[force_channels("y", "m")[0]]) - seen.rest[:, 1] + seen.friction[:, 1]
+    assert dry == pytest.approx(8 * np.sign(seen.motion.velocity[:, 1]), abs=1e-6)
+    assert np.any(np.abs(seen.friction[:, 1]) < 4)
 
 
 @pytest.mark.slow

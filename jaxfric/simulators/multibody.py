@@ -167,7 +167,9 @@ class Mujoco(AbstractSimulator):
         for i in moving[moving != self.number].tolist():
             named = self.joints[i], "rad" if is_hinge(self.mujoco, self.model, i) else "m"
             found[neighbour_channel(*named)] = seen.motion.velocity[:, i]
-            parts = seen.rest[:, i], seen.momentum[:, i]
+            # A machine's dry friction is at its limit as soon as it slips, MuJoCo's a while later.
+            dry = float(self.model.dof_frictionloss[i]) * np.sign(seen.motion.velocity[:, i])
+            parts = seen.rest[:, i] - seen.friction[:, i] + dry, seen.momentum[:, i]
             found |= dict(zip(force_channels(*named), parts, strict=True))
         return found
 
