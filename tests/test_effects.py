@@ -561,6 +561,8 @@ def with_predictions(run, model):
         "predicted_reaction": inertia * acceleration,
         "neighbour_velocity": other,
         "known_velocity m x": other,
+        "known_needed m x": 40 * other,
+        "known_needed_momentum m x": 3 * other,
         "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
     }
     return dataclasses.replace(run, channels={k: jnp.asarray(c) for k, c in channels.items()})

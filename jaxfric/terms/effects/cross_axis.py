@@ -78,11 +78,12 @@ class CrossForce(AbstractLaw):
     """
 
     neighbour: tuple[str, ...] = eqx.field(static=True, converter=tuple)
-    spelled: str = eqx.field(static=True, default="")
+    spelled: tuple[str, ...] = eqx.field(static=True, default=(), converter=tuple)
 
     @property
     def affine(self):
-        return (Parameter(f"{SHARE}_{self.neighbour[0]}", self.spelled or DIMENSIONLESS),)
+        unit = self.spelled[0] if self.spelled else DIMENSIONLESS
+        return (Parameter(f"{SHARE}_{self.neighbour[0]}", unit),)
 
     @property
     def coordinates(self):
@@ -106,7 +107,7 @@ def _neighbours(recording: Recording) -> tuple[CrossAxis | CrossForce, ...]:
             found.append(CrossAxis((name, unit), spelled))
         elif channel.startswith(NEEDED):
             unit, _, name = channel.removeprefix(NEEDED).partition(" ")
-            ratio = "" if unit == own else "1/m" if unit == "rad" else "m"
+            ratio = () if unit == own else ("1/m",) if unit == "rad" else ("m",)
             found.append(CrossForce((name, unit), ratio))
     return tuple(found)
 
