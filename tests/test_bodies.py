@@ -17,7 +17,7 @@ from jaxfric.export.patch import patch
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.simulators import Mujoco, inverse
 from jaxfric.simulators.patching import patched
-from jaxfric.simulators.weights import by_gravity, linear, possible, weights
+from jaxfric.simulators.weights import by_gravity, linear, possible, pulled, weights
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -68,8 +68,11 @@ def rows(nominal, plant, noise=0.005, seed=0):
     forces = inverse.forces(mujoco, true, along) - inverse.forces(mujoco, model, along)
     draw, found = np.random.default_rng(seed), []
     for joint, name in enumerate(("shoulder", "elbow")):
-        pulls = by_gravity(mujoco, model, joint, seen)
-        parts = [(rest, 0 * rest) for rest in pulls] + linear(mujoco, model, joint, seen)
+        turned, products = (
+            [(rest, 0 * rest) for rest in each(mujoco, model, joint, seen)]
+            for each in (by_gravity, pulled)
+        )
+        parts = turned + linear(mujoco, model, joint, seen) + products
         columns = np.array([rest + np.gradient(moving, time) for rest, moving in parts]).T
         own = np.array([along.velocity[:, joint], along.acceleration[:, joint]]).T
         inner = slice(2, -2)  # the ends have one-sided differences
@@ -167,14 +170,14 @@ def test_nothing_is_found_where_nothing_differs():
     assert answer(rows(arm(), arm()), ()).values == {}
 
 
-def pulled(gravity):
+def standing(gravity):
     """The arm where gravity is another one than in the file."""
     return arm().replace("<option ", f'<option gravity="{gravity}" ')
 
 
 def test_a_base_that_is_tilted_is_no_fault_of_the_bodies():
     tilt = np.radians(3.0)
-    robot = rows(arm(), pulled(f"{9.81 * np.sin(tilt)} 0 {-9.81 * np.cos(tilt)}"))
+    robot = rows(arm(), standing(f"{9.81 * np.sin(tilt)} 0 {-9.81 * np.cos(tilt)}"))
     found = answer(robot, {"upper", "fore"})
     assert list(found.values) == ["option/gravity/x"]
     known = found.estimates["option/gravity/x"]
@@ -184,11 +187,23 @@ def test_a_base_that_is_tilted_is_no_fault_of_the_bodies():
     assert robot.gravity(found.values) == pytest.approx(-9.81 * np.cos(tilt), abs=1e-3)
 
 
+def test_gravity_of_another_direction_pulls_on_what_the_bodies_weigh():
+    """Of another mass under another gravity the force is a product, which is no small one here."""
+    tilt = np.radians(10.0)
+    gravity = f"{9.81 * np.sin(tilt)} 0 {-9.81 * np.cos(tilt)}"
+    plant = standing(gravity).replace('mass="1.2"', 'mass="1.8"')
+    found = answer(rows(arm(), plant), {"upper", "fore"})
+    assert set(found.values) == {f"{FORE}mass_alone", "option/gravity/x"}
+    for name, value in ((f"{FORE}mass_alone", 1.8), ("option/gravity/x", 9.81 * np.sin(tilt))):
+        known = found.estimates[name]
+        assert abs(known.value - value) < 3 * known.standard_error < 0.02 * value
+
+
 @pytest.mark.parametrize("gravity", [9.81, 9.80, -9.81])
 def test_a_base_on_a_wall_is_told_with_a_finite_error(gravity):
     """Gravity's largest component is next to nothing then, and its derivative infinite."""
     down = -np.sqrt(max(9.81**2 - gravity**2, 0.0))
-    robot = rows(arm(), pulled(f"{gravity} 0 {down}"))
+    robot = rows(arm(), standing(f"{gravity} 0 {down}"))
     found = answer(robot, {"upper", "fore"})
     assert {name.split("/")[0] for name in found.values} == {"option"}
     assert found.values["option/gravity/x"] == pytest.approx(gravity, abs=0.02)
@@ -198,12 +213,40 @@ def test_a_base_on_a_wall_is_told_with_a_finite_error(gravity):
 
 
 def test_a_gravity_of_another_size_is_one_number():
-    found = answer(rows(pulled("0 0 -9"), arm()), {"upper", "fore"})
+    found = answer(rows(standing("0 0 -9"), arm()), {"upper", "fore"})
     assert list(found.values) == ["option/gravity/z"]
     assert found.values["option/gravity/z"] == pytest.approx(-9.81, abs=0.01)
 
 
-@pytest.mark.parametrize("text", [arm(), pulled("0 1 -9")])
+@pytest.mark.parametrize(("value", "error", "told"), [(-9.2, 0.01, True), (-9.2, 0.4, False),
+                                                     (-9.81, 0.001, False)])  # fmt: skip
+def test_gravity_of_a_size_that_it_has_nowhere_stands_for_something_else(value, error, told):
+    robot = rows(arm(), arm())
+    moved = {robot.down: Moved(-9.0, Estimate(np.float64(value), np.float64(error), "m/s²"))}
+    assert agreement._impossible(moved, robot) is told
+    assert not agreement._impossible({}, robot)
+
+
+@pytest.mark.slow
+def test_of_a_gravity_that_is_nowhere_nothing_is_written(tmp_path, capsys, monkeypatch):
+    """As on another planet, where the file's is right."""
+    monkeypatch.setattr(agreement, "EARTH", (8.9, 9.1))
+    (tmp_path / "arm.xml").write_text(standing("0 0 -9"))
+    log(tmp_path / "log.csv", arm(), 1)
+    command = ["explain", str(tmp_path / "log.csv"), "--mujoco", str(tmp_path / "arm.xml")]
+    new, out = str(tmp_path / "new.xml"), str(tmp_path / "out.json")
+    assert cli.main([*command, "--save", new, "--json", out]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "gravity is of that size nowhere: something else is wrong" in said
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert document["patch"]["written"] == []
+    for row in document["joints"]:
+        (finding,) = row["explanation"]["findings"]
+        assert row["verdict"] == "partly_explained" and not finding["parameters"]
+        assert finding["untold"] == ["option/gravity/z"]
+
+
+@pytest.mark.parametrize("text", [arm(), standing("0 1 -9")])
 def test_gravity_is_written_into_the_file_s_option(text):
     done = patched(mujoco, text, {"option/gravity/x": 0.5, "option/gravity/z": -9.8})
     assert not done.left and len(done.written) == 2
@@ -276,7 +319,7 @@ def test_a_load_is_written_once_and_the_file_keeps_its_word(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_gravity_is_told_by_all_joints_and_written_once(tmp_path, capsys):
-    (tmp_path / "arm.xml").write_text(pulled("0 0 -9"))
+    (tmp_path / "arm.xml").write_text(standing("0 0 -9"))
     logs = [str(tmp_path / f"log{seed}.csv") for seed in (1, 2)]
     for seed, path in enumerate(logs):
         log(path, arm(), seed)

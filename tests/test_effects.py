@@ -46,6 +46,7 @@ CASES = {
     "recorded_load": (T.LoadDependentFriction("load"), (0.1,)),
     "cross_axis": (T.CrossAxis(), (0.5, 8.0)),
     "named_cross_axis": (T.CrossAxis(("x", "m")), (0.5, 8.0)),
+    "cross_force": (T.CrossForce(("x", "m")), (0.2,)),
     "deadband": (T.ActuatorDeadband(), (1.5,)),
     "saturation": (T.ActuatorSaturation(25.0), (0.2,)),
     "soft_saturation": (T.SoftSaturation(45.0), (0.8,)),
@@ -104,6 +105,8 @@ def motion(force=1.0, position=1.0, count=12):
         "predicted_reaction": force * 20 * np.sin(3 * t + 1),
         "neighbour_velocity": position * 0.1 * np.sin(2 * t),
         "known_velocity m x": position * 0.1 * np.sin(2 * t),
+        "known_needed m x": force * 20 * np.sin(2 * t),
+        "known_needed_momentum m x": force * 10 * np.cos(2 * t),
         "load": force * (5 + np.sin(t)),
     }
     return Recording(t, 0 * t, x, v, channels=channels)
@@ -558,6 +561,8 @@ def with_predictions(run, model):
         "predicted_reaction": inertia * acceleration,
         "neighbour_velocity": other,
         "known_velocity m x": other,
+        "known_needed m x": 40 * other,
+        "known_needed_momentum m x": 3 * other,
         "load": 15 + 10 * np.sin(2 * np.pi * 0.6 * np.asarray(run.time)),
     }
     return dataclasses.replace(run, channels={k: jnp.asarray(c) for k, c in channels.items()})

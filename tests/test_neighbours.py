@@ -6,8 +6,8 @@ import pytest
 from jaxfric import Recording, cli, explain
 from jaxfric.simulators import Mujoco
 from jaxfric.terms import CrossAxis
-from jaxfric.terms.effects.cross_axis import CROSS_AXIS, neighbour_channel
-from jaxfric.units import DAMPING
+from jaxfric.terms.effects.cross_axis import CROSS_AXIS, force_channels, neighbour_channel
+from jaxfric.units import DAMPING, DIMENSIONLESS
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -54,19 +54,22 @@ def recording(motion, joint, more=0.0):
 def test_each_other_joint_is_a_candidate_in_its_own_units(motion):
     log, simulator = recording(motion, 2)
     laws = CROSS_AXIS.recorded(simulator.beside(log))
-    assert [law.neighbour[0] for law in laws] == ["x", "y"]
+    assert [law.neighbour[0] for law in laws] == ["x", "x", "y", "y"]
     assert [p.dimension for p in laws[0].affine] == ["N·m·s²/m", "N·m·s/m"]
+    assert [p.dimension for p in laws[1].affine] == ["m"]
     log, simulator = recording(motion, 0)
-    y, turn = CROSS_AXIS.recorded(simulator.beside(log))
+    y, by_force, turn, turned = CROSS_AXIS.recorded(simulator.beside(log))
     assert y.affine[1].dimension == DAMPING
+    assert by_force.affine[0].dimension == DIMENSIONLESS
     assert turn.affine[1].dimension == "N·s/rad"
+    assert turned.affine[0].dimension == "1/m"
     assert CROSS_AXIS.recorded(log) == ()
 
 
 def test_a_joint_that_stands_pulls_nothing(motion):
     time, position, speed, force = motion
     log, simulator = recording((time, position * [1, 1, 0], speed, force), 1)
-    assert [law.neighbour[0] for law in CROSS_AXIS.recorded(simulator.beside(log))] == ["x"]
+    assert {law.neighbour[0] for law in CROSS_AXIS.recorded(simulator.beside(log))} == {"x"}
 
 
 @pytest.mark.slow
@@ -78,6 +81,30 @@ def test_the_neighbour_that_pulls_is_named(motion):
     drag = finding.parameters["coupling_viscous_x"]
     assert abs(float(drag.value) - 15) < 3 * float(drag.standard_error) + 0.05
     assert "N·s/m times its velocity" in finding.sentence
+
+
+def test_the_dry_friction_of_a_neighbour_is_at_its_limit_as_soon_as_it_slips(motion):
+    """MuJoCo's creeps about a reversal, as no friction of a machine does."""
+    log, _ = recording(motion, 0)
+    simulator = Mujoco(GANTRY.replace('damping="30"', 'damping="30" frictionloss="8"'), "x")
+    seen, channels = simulator.along(log), simulator.beside(log).channels
+    dry = np.asarray(channels[force_channels("y", "m")[0]]) - seen.rest[:, 1] + seen.friction[:, 1]
+    assert dry == pytest.approx(8 * np.sign(seen.motion.velocity[:, 1]), abs=1e-6)
+    assert np.any(np.abs(seen.friction[:, 1]) < 4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("other", "share"), [(0, 0.3), (2, -2.0)])
+def test_a_motor_that_rests_on_another_joint_is_told_by_its_force(motion, other, share):
+    """A part of all that a neighbour needs, its friction too: no part of its acceleration."""
+    found = explain(*recording(motion, 1, share * motion[3][:, other]))
+    (finding,) = found.findings
+    name = f"coupling_force_{JOINTS[other]}"
+    assert finding.effect == "cross_axis" and set(finding.parameters) == {name}
+    known = finding.parameters[name]
+    assert abs(float(known.value) - share) < max(3 * float(known.standard_error), 0.01 * abs(share))
+    assert known.unit == ("1" if other == 0 else "1/m")
+    assert f"joint {JOINTS[other]} needs is needed here too" in finding.sentence
 
 
 @pytest.mark.slow

@@ -503,10 +503,15 @@ class Reported:
 
     def __init__(self, names, wrong):
         self.names, self.wrong = names, wrong
-        each = [types.SimpleNamespace(effect=types.SimpleNamespace(name=n)) for n in names]
+        law = types.SimpleNamespace(candidate=types.SimpleNamespace(term=terms.Viscous()))
+        each = [
+            types.SimpleNamespace(effect=types.SimpleNamespace(name=n), trial=law) for n in names
+        ]
         self.selection = types.SimpleNamespace(given=None, selected=each, base=None)
         last = types.SimpleNamespace(energy=self.ENERGY["".join(sorted(names))])
-        self.undelayed = types.SimpleNamespace(selection=types.SimpleNamespace(last=last))
+        self.undelayed = types.SimpleNamespace(
+            selection=types.SimpleNamespace(selected=each, last=last)
+        )
 
     def without(self, number):
         return Reported(self.names[:number] + self.names[number + 1 :], self.wrong)

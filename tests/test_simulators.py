@@ -81,6 +81,20 @@ def test_missing_physics_beside_a_wrong_value(healthy):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
+def test_a_bump_beside_dry_friction_that_is_wrong(healthy):
+    """Beside the value as given the bump would take another shape, and the value would be lost."""
+    bare = {"coulomb+": 25.0, "coulomb-": 21.0, "stribeck_force+": 0.0, "stribeck_force-": 0.0}
+    found = explain(healthy[0], simulator(**bare), healthy[1])
+    named = {finding.effect: finding for finding in found.findings}
+    assert set(named) == {"stribeck", "parameter_mismatch"}
+    moved = named["parameter_mismatch"].parameters
+    assert set(moved) == {"coulomb"}
+    assert float(moved["coulomb"].value) == pytest.approx(-3.0, abs=0.2)
+    bump = named["stribeck"].parameters
+    assert float(bump["stribeck_force+"].value) == pytest.approx(6.6, rel=0.1)
+
+
 def test_the_saved_model_stands_on_the_simulators_force(healthy, tmp_path):
     run = planted(healthy[0], *CASES["spring"])
     found = explain(run, simulator())

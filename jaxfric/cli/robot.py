@@ -20,7 +20,7 @@ from .commands import put, today, working
 from .messages import say
 from .robot_joints import Joint, checked_logs, explained, opened
 from .saving import saved
-from .together import together
+from .together import loaded, together
 
 SCHEMA = "jaxfric.robot/1"
 
@@ -69,7 +69,7 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
             doing(f"joint {name}")
             found.append(explained(there[name], checked, arguments.mujoco, shared, arguments))
         doing("the bodies, by all joints")
-        found = together(there, found, checked, shared, arguments)
+        found = loaded(together(there, found, checked, shared, arguments))
         told = with_contradictions({j.name: j.told for j in found if j.told is not None})
         found = [joint._replace(told=told.get(joint.name)) for joint in found]
     without = [Joint(name, None, why, [], None, []) for name, why in logged.without.items()]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from ..explanation.acceptance import LINEARITY
 from ..explanation.agreement import Agreement, Told, agreed, with_bodies
 from ..explanation.attributes import CONSTANT
+from ..explanation.loads import with_load
 from ..explanation.sanity import CheckedSimulator
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched, with_inertial
@@ -46,6 +47,14 @@ def together(
             joint = _joined(joint, new, agreement, names)
         again.append(joint)
     return again
+
+
+def loaded(found: Sequence[Joint]) -> list[Joint]:
+    """The joints with one answer for what a body has picked up or put down, if there is one."""
+    able = [j for j in found if j.told is not None and j.simulator is not None]
+    told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
+    new = dict(zip([joint.name for joint in able], with_load(told), strict=True))
+    return [joint._replace(told=new.get(joint.name, joint.told)) for joint in found]
 
 
 def _clearly_more(new: Joint, own: Joint) -> bool:

@@ -2,6 +2,7 @@
 itself.
 """
 
+import dataclasses
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled
 from .acceptance import LINEARITY
-from .attributes import CONSTANT, listed
+from .attributes import CONSTANT, claimed, listed
 from .bodies import Bodies, State
 from .explained import Explanation
 from .fewest_numbers import answer
@@ -30,6 +31,8 @@ from .sanity.preceding import p_value, with_preceding
 
 # A base is set up to a tenth of a degree.
 STRAIGHT = 0.1
+# Gravity at the poles, and at the equator five kilometres up, m/s².
+EARTH = 9.765, 9.833
 
 
 class Told(NamedTuple):
@@ -44,12 +47,14 @@ class Told(NamedTuple):
 
 class Agreement(NamedTuple):
     """The values of bodies and of gravity that all joints together say are wrong: `parameters` by
-    name, `text` in words, `instead` what else would do as well in place of each.
+    name, `text` in words, `instead` what else would do as well in place of each; `impossible`:
+    whether gravity would have to be of a size that it has nowhere.
     """
 
     parameters: dict[str, Moved]
     text: str
     instead: dict[str, tuple[str, ...]]
+    impossible: bool = False
 
     def values(self) -> dict[str, float]:
         """The values by name."""
@@ -99,7 +104,22 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
         text += (
             f"; that is not all: of joint {listed_and(found.short)} other bodies would leave less"
         )
-    return Agreement(moved, text, found.instead)
+    impossible = _impossible(moved, rows)
+    if impossible:
+        text += f"; gravity is of that size nowhere: something else is wrong, as {GEOMETRY}"
+    return Agreement(moved, text, found.instead, impossible)
+
+
+def _impossible(moved: Mapping[str, Moved], rows: Bodies) -> bool:
+    """Whether gravity would have to be of a size that it has nowhere, beyond its error.
+
+    Of a length that is wrong the pull of all that hangs on it is.
+    """
+    if rows.down not in moved:
+        return False
+    values = [moved[n].value if n in moved else rows.before[n] for n in GRAVITY]
+    size, half = np.linalg.norm(np.array(values, float)), float(moved[rows.down].half_width())
+    return not EARTH[0] - half <= size <= EARTH[1] + half
 
 
 def _moved(rows: Bodies, others, state: State) -> dict[str, Moved]:
@@ -169,14 +189,31 @@ def with_bodies(
         MISMATCH, EFFECTS[MISMATCH].equation,
         f"Wrong in the simulator: {together}{agreement.text}; {share:.0%} of the unexplained "
         "force.",
-        (), "", moved, share, _held_out_share(found, first),
+        (), "", {} if agreement.impossible else moved, share, _held_out_share(found, first),
         max(p_value(m.change) for m in moved.values()),
-        attribute=", ".join(moved), confirmed=_confirmed(found, first),
+        attribute=None if agreement.impossible else ", ".join(moved),
+        confirmed=_confirmed(found, first),
         instead={n: o for n, o in agreement.instead.items() if n in moved},
+        untold=tuple(moved) if agreement.impossible else (),
     )  # fmt: skip
     names = ("force_error", name, "holdout_force_error", "filtered_holdout_force_error")
     errors = {n: first.fit[n]["before"] for n in names if first.fit[n] and found.fit[n]}
-    return with_preceding(found, [finding], part, errors)
+    told = with_preceding(found, [finding], part, errors)
+    return _without_values(told) if agreement.impossible else told
+
+
+def _without_values(told: Explanation) -> Explanation:
+    """An explanation whose first finding is of values that cannot be: nor is there anything in what
+    a joint's own values lack beside them.
+    """
+    kept = [i for i, f in enumerate(told.findings) if not i or f.effect != MISMATCH]
+    pictures = told.curves["findings"]
+    return dataclasses.replace(
+        told,
+        findings=[told.findings[i] for i in kept],
+        curves=told.curves | {"findings": [pictures[i] for i in kept]},
+        verdict=claimed(told.verdict, told.findings),
+    )
 
 
 def _held_out_share(found: Explanation, first: Explanation) -> float | None:
@@ -253,15 +290,19 @@ def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -
     )
 
 
+# What no value of a body or of gravity stands for.
+GEOMETRY = (
+    "the file's geometry (lengths of links, axes, couplings of joints), which is not among what is "
+    "asked"
+)
+
+
 def _geometry(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
     """A doubt where values of several bodies differ: a part that is bolted on changes one."""
     bodies = dict.fromkeys(rows.owner[name][0] for name in moved if name in rows.owner)
     if len(bodies) < 2:
         return []
-    return [
-        f"these are values of {len(bodies)} bodies at once: look first at the file's geometry "
-        "(lengths of links, axes, couplings of joints), which is not among what is asked"
-    ]
+    return [f"these are values of {len(bodies)} bodies at once: look first at {GEOMETRY}"]
 
 
 def _raised(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:

@@ -5,8 +5,8 @@ frame), and these are what a file's numbers make of them: m c and I + m (cÂ² 1 â
 functions of mass and centre. So the fewest of the file's numbers that leave no joint more than all
 the linear parameters do are looked for by Gauss-Newton's steps, each set by itself, with one value
 of each number for all joints. Gravity, the same for all, counts as three more numbers: a base that
-stands askew is no fault of a body. It pulls on bodies as they are in the file, to first order, and
-keeps its size where only its direction is a number.
+stands askew is no fault of a body. It pulls on what the bodies weigh then, which is a product of
+numbers, and keeps its size where only its direction is a number.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from ..identification.uncertainty import Estimate
 from ..simulators.rigid import PARAMETERS
-from ..simulators.weights import GRAVITY, Weight, attribute
+from ..simulators.weights import GRAVITY, PULLED, Weight, attribute
 from .intervals import spread
 from .joint_rows import JointRows
 from .regression import Fit
@@ -51,7 +51,8 @@ class Bodies:
                 self.before[f"body/{body}/{what}"] = value
         bodies = len(self.place)
         self.starts = {body: bodies + PARAMETERS * i for i, body in enumerate(weights)}
-        count = bodies + PARAMETERS * len(weights)
+        self.products = bodies + PARAMETERS * len(weights)
+        count = self.products + PULLED * len(GRAVITY) * len(weights)
         self.grams = np.zeros((len(joints), count, count))
         self.pulls, self.pull = np.zeros((len(joints), count)), np.zeros(count)
         self.powers = np.array([joint.target @ joint.target for joint in joints])
@@ -61,9 +62,12 @@ class Bodies:
             self.grams[k][np.ix_(at, at)] = joint.columns.T @ joint.columns
             self.pulls[k][at] = joint.columns.T @ joint.target
         self.gram, self.pull = self.grams.sum(axis=0), self.pulls.sum(axis=0)
-        size = np.sqrt(np.maximum(np.diag(self.gram), 1e-300))
-        scaled = self.gram / np.outer(size, size)
-        every = np.linalg.lstsq(scaled, self.pull / size, rcond=1e-12)[0] / size
+        # All that the force is linear in; a product of two of these is no parameter by itself.
+        linear = slice(0, self.products)
+        size = np.sqrt(np.maximum(np.diag(self.gram)[linear], 1e-300))
+        scaled = self.gram[linear, linear] / np.outer(size, size)
+        every = np.zeros(count)
+        every[linear] = np.linalg.lstsq(scaled, self.pull[linear] / size, rcond=1e-12)[0] / size
         self.least = self._energies(every)
 
     def _at(self, number: int) -> list[int]:
@@ -111,6 +115,10 @@ class Bodies:
             start = self.starts[body]
             new = self.weight(body, state, any_).parameters()
             found[start : start + PARAMETERS] = new - self.weights[body].parameters()
+        gravity = np.array([found[self.place[name]] for name in GRAVITY])
+        if np.any(gravity):
+            heavier = found[self.shared + len(GRAVITY) : self.products].reshape(-1, PARAMETERS)
+            found[self.products :] = np.multiply.outer(heavier[:, :PULLED], gravity).ravel()
         return found
 
     def turned(self, state: State) -> bool:

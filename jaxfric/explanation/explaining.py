@@ -216,7 +216,9 @@ def _with_dropped(better: Improved, rounds: list[Improved]) -> Improved:
     """With the effects that any round dropped and that no other law of theirs stands for."""
     names = dict.fromkeys(name for each in rounds for name in each.dropped)
     dropped = tuple(name for name in names if name not in better.findings.selection.names)
-    return better._replace(dropped=dropped, spoilt=rounds[0].spoilt if dropped else None)
+    seen = tuple(name for name in dropped if any(name in each.seen for each in rounds))
+    spoilt = rounds[0].spoilt if dropped else None
+    return better._replace(dropped=dropped, spoilt=spoilt, seen=seen)
 
 
 def _unjudged(

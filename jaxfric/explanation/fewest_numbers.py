@@ -49,7 +49,7 @@ def _short(robot: Bodies, state: State) -> tuple[str, ...]:
     """Joints of which a state leaves more than all linear parameters do, by more than as many
     parameters take of noise.
     """
-    most = np.maximum(robot.enough, len(robot.pull))
+    most = np.maximum(robot.enough, robot.products)
     more = robot.energies(state) - robot.least > most
     return tuple(joint.name for joint, each in zip(robot.joints, more, strict=True) if each)
 

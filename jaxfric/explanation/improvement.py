@@ -10,6 +10,7 @@ from ..models import Model
 from ..simulation.errors import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled, verification
+from .acceptance import HALF
 from .figures import Figures
 from .findings import Findings
 from .problem import LEAST_SHARE
@@ -57,7 +58,7 @@ class Improved(NamedTuple):
 
     - `first`: the fit of the baseline; `refitted`: whether its values are others than those given.
     - `dropped`: effects whose findings were dropped, as the model with them is worse; `spoilt`: its
-      errors.
+      errors; `seen`: those of them that noise is not.
     - `claimed`: the findings that the recording shows, of which the held-out recording does not
       confirm those of the numbers `refuted`; `worse`: the errors before and with them, where what
       each of them removes there is confirmed, but the model with them is worse.
@@ -70,6 +71,7 @@ class Improved(NamedTuple):
     after: Errors
     dropped: tuple[str, ...] = ()
     spoilt: Errors | None = None
+    seen: tuple[str, ...] = ()
     claimed: Findings | None = None
     refuted: tuple[int, ...] = ()
     worse: tuple[Errors, Errors] | None = None
@@ -119,7 +121,22 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
     dropped = _dropped(claimed, findings)
     if spoilt is not None and not dropped:
         dropped = (MISMATCH,)
-    return Improved(first, findings, refitted, before, after, dropped, spoilt)
+    seen = tuple(name for name in dropped if not _as_noise(name, claimed))
+    return Improved(first, findings, refitted, before, after, dropped, spoilt, seen)
+
+
+def _as_noise(name: str, found: Findings) -> bool:
+    """Whether an effect may be the encoder's noise by the controller's answer: of a load that
+    swings faster than a wide kernel resolves. That noise makes a quarter of a residual at most.
+    """
+    selected = found.undelayed.selection.selected
+    own = [n for n, each in enumerate(selected) if each.effect.name == name]
+    most = found.undelayed.selection.last.energy / (1 - HALF)
+    return bool(own) and all(
+        selected[n].trial.candidate.term.swings
+        and found.without(n).undelayed.selection.last.energy < most
+        for n in own
+    )
 
 
 def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """One joint's log as rows of a regression that several joints share: by what its bodies weigh."""
 
 import dataclasses
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -9,9 +10,9 @@ import numpy as np
 from ..data.recording import Recording
 from ..models import Model
 from ..simulators import Mujoco
-from ..simulators.weights import by_gravity, linear
+from ..simulators.weights import by_gravity, linear, pulled
 from ..terms import KnownColumns, KnownForce, Offset, channels_of
-from ..terms.base import summands
+from ..terms.base import AbstractTerm, summands
 from ..terms.effects import traits
 from .evidence import Evidence, gather
 from .figures import cast
@@ -27,8 +28,9 @@ class JointRows(NamedTuple):
     """One joint's rows, divided by its noise, without the span of the physics that was found in it.
 
     - `name` of the joint; `own`: names of its own values, p of them, in the simulator's words.
-    - `columns` `(J, p + 3 + 10 B)`: the force by a unit of its own values, of gravity along each
+    - `columns` `(J, p + 3 + 22 B)`: the force by a unit of its own values, of gravity along each
       axis, and of the ten parameters that the force of each of the model's B bodies is linear in;
+      then of gravity along each axis on a unit of mass and of first moment of each body;
       `target` `(J,)`: what the simulator, as given, leaves; `block` of each row, `(J,)`.
     - `enough`: the energy below which no sensor of force tells anything, in units of the noise's.
     """
@@ -41,18 +43,27 @@ class JointRows(NamedTuple):
     enough: float
 
 
-def joint_rows(
-    simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float, wide: int = 1
-) -> JointRows:
-    """The rows of a joint.
+class Opened(NamedTuple):
+    """A joint's evidence with what the model's values add to its force as channels.
 
-    **Arguments:** `simulator` as given, `log` `(N,)`; `found`, the model of the joint's own
-    explanation, whose missing physics stands beside; `delay`, s, by which the force is taken later;
-    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width.
+    `own`: rows `(J, p)` by the values of its own, of those `names`; `shared`: the columns that all
+    joints have: three of gravity, ten of each body with mass, then the products of both.
     """
+
+    evidence: Evidence
+    names: tuple[str, ...]
+    own: np.ndarray
+    shared: KnownColumns
+
+
+def opened(simulator: Mujoco, log: Recording, delay: float, wide: int = 1) -> Opened:
+    """A joint's evidence, by a simulator as given; the arguments as of [`joint_rows`][]."""
     seen = simulator.along(log)
     of = simulator.mujoco, simulator.model, simulator.number, seen
-    parts = [(rest, np.zeros_like(rest)) for rest in by_gravity(*of)] + linear(*of)
+    turned, products = (
+        [(rest, np.zeros_like(rest)) for rest in each(*of)] for each in (by_gravity, pulled)
+    )
+    parts = turned + linear(*of) + products
     names = [name for name in simulator.attributes() if not name.startswith("body/")]
     first = len(simulator.attributes())
     beside = simulator.beside(log)
@@ -70,19 +81,36 @@ def joint_rows(
     constant = [t for t in summands(simulator.baseline(log.units).term) if isinstance(t, Offset)]
     own += [evidence.columns(t, np.zeros((1, 0)))[0] for t in constant]
     names += [p.name for t in constant for p in t.affine]
-    columns = np.concatenate([*own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
-    basis = _physics(found, evidence)
+    return Opened(evidence, tuple(names), np.concatenate(own, axis=1), shared)
+
+
+def joint_rows(
+    simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float, wide: int = 1
+) -> JointRows:
+    """The rows of a joint.
+
+    **Arguments:** `simulator` as given, `log` `(N,)`; `found`, the model of the joint's own
+    explanation, whose missing physics stands beside; `delay`, s, by which the force is taken later;
+    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width.
+    """
+    evidence, names, own, shared = opened(simulator, log, delay, wide)
+    columns = np.concatenate([own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
+    basis = physics(found, evidence)
     columns = columns - basis @ (basis.T @ columns)
     target = evidence.target - basis @ (basis.T @ evidence.target)
     left = target - columns @ solve(columns, target)
     noise = max(float(np.sqrt(np.mean(left**2))), 1e-300)
     enough = (linearity / noise) ** 2 * float(evidence.force @ evidence.force)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    return JointRows(simulator.joint, tuple(names), columns / noise, target / noise, block, enough)
+    return JointRows(simulator.joint, names, columns / noise, target / noise, block, enough)
 
 
-def _physics(found: Model, evidence: Evidence) -> np.ndarray:
-    """An orthonormal basis of the force of the missing physics that a joint's model holds."""
+def physics(
+    found: Model, evidence: Evidence, but: Callable[[AbstractTerm], bool] = lambda term: False
+) -> np.ndarray:
+    """An orthonormal basis of the force of the missing physics that a joint's model holds, `but`
+    for some terms.
+    """
     terms, betas, alphas, start = [], [], [], 0
     for term in summands(found.term):
         alpha = np.asarray(found.alpha[start : start + len(term.affine)], float)
@@ -92,7 +120,7 @@ def _physics(found: Model, evidence: Evidence) -> np.ndarray:
         alphas.append(alpha)
     empty = np.zeros((len(evidence.target), 0))
     whole = Fit(tuple(terms), tuple(betas), tuple(alphas), empty, empty, evidence.target, 0.0)
-    missing = [i for i, term in enumerate(terms) if _is_physics(term)]
+    missing = [i for i, term in enumerate(terms) if _is_physics(term) and not but(term)]
     if not missing:
         return empty
     seen = with_predictions(evidence, _without_known(whole))

@@ -49,8 +49,8 @@ def mismatch(
     do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the width,
     which have to show them too.
     """
-    given, own, beside = _apart(model, refitted, evidence)
-    first = at_values(model, evidence).energy
+    given, first = as_given(model, refitted, evidence), at_values(model, evidence).energy
+    residual, own, beside = _apart(model, refitted, evidence)
     gained = given.energy - refitted.energy
     least = max(LEAST_SHARE * given.energy, LEAST_OF_BASE * first)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
@@ -62,30 +62,36 @@ def mismatch(
         return None
     before = [*given.alphas[0], *given.betas[0]]
     enough = LINEARITY**2 * float(evidence.force @ evidence.force)
-    free = fewest(own, given.residual, block, enough)
+    free = fewest(own, residual, block, enough)
     if free and wide is not None and len(free) <= MOST_WRONG:
-        free = _lasting(model, refitted, wide, free, solve(own[:, free], given.residual))
+        free = _lasting(model, refitted, wide, free, solve(own[:, free], residual))
     if not free:
         return None
     free = _different(model, refitted, evidence, block, free)
-    instead = _instead(own, given.residual, block, free, enough)
+    instead = _instead(own, residual, block, free, enough)
     if vague := [i for i, others in instead.items() if len(others) > VAGUE * own.shape[1]]:
         free = [i for i in free if i not in vague] or free
-        instead = _instead(own, given.residual, block, free, enough)
+        instead = _instead(own, residual, block, free, enough)
     moved = {i: before[i] for i in sorted(free)}
     return Mismatch(moved, float(gained / first), p_value, given.energy, instead=instead)
 
 
-def _apart(model: Model, refitted: Fit, evidence: Evidence) -> tuple[Fit, np.ndarray, np.ndarray]:
-    """The fit at the values as given; its parameters' columns and derivatives apart from those of
-    all other terms, and an orthonormal basis of the latter.
+def _apart(
+    model: Model, refitted: Fit, evidence: Evidence
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The residual at the values as given, and the parameters' columns and derivatives, both apart
+    from those of all other terms, whose orthonormal basis is the last.
+
+    The other terms have the shapes that they have beside the refitted values: the derivatives are
+    of that place. Beside values that are wrong they would take other shapes, to make up for these.
     """
-    given = as_given(model, refitted, evidence)
+    given = as_given(model, refitted, evidence, iterations=0)
     count, counts = len(given.alphas[0]), len(given.betas[0])
     affine, slopes = refitted.columns, refitted.slopes
     own = np.concatenate([affine[:, :count], slopes[:, :counts]], axis=1)
     beside = orthonormal(np.concatenate([affine[:, count:], slopes[:, counts:]], axis=1))
-    return given, own - beside @ (beside.T @ own), beside
+    residual = given.residual - beside @ (beside.T @ given.residual)
+    return residual, own - beside @ (beside.T @ own), beside
 
 
 def _lasting(
@@ -95,8 +101,8 @@ def _lasting(
     smaller: the noise of the acceleration, which shifts an inertia, is much weaker there.
     """
     there = fit(refitted.terms, with_predictions(wide, refitted), refitted.betas, 0)
-    given, own, _ = _apart(model, there, wide)
-    again = solve(own[:, free], given.residual)
+    residual, own, _ = _apart(model, there, wide)
+    again = solve(own[:, free], residual)
     return [i for i, one, two in zip(free, shifts, again, strict=True)
             if two * np.sign(one) >= PERSISTS * abs(one)]  # fmt: skip
 

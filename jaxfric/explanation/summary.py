@@ -80,7 +80,7 @@ def summarise(
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     # In another recording that is compared with, what has no name may be as well.
-    seen = better.dropped if better.spoilt is not None and known.fit is None else ()
+    seen = better.seen if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     verdict = verdict_of(findings, new, later, much, standing, remarks, seen)
     there = [*before.counts, *tones]
@@ -157,7 +157,7 @@ def _doubts(better: Improved) -> list[Remark]:
     remarks = doubts(selection.last, problem, values, better.after.filtered)
     if problem.creeps:
         remarks.append(creeping(problem))
-    if better.spoilt is not None:
+    if better.spoilt is not None and better.seen:
         remark = not_better(better.dropped, better.before, better.spoilt)
         late = any(EFFECTS[name].late for name in better.dropped)
         if late and not evidence.located:

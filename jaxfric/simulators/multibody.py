@@ -23,7 +23,7 @@ from ..terms import (
     channels_of,
 )
 from ..terms.base import Sum
-from ..terms.effects.cross_axis import neighbour_channel
+from ..terms.effects.cross_axis import force_channels, neighbour_channel
 from . import actuation, columns, inverse
 from .known import AbstractSimulator, Attribute, along
 from .loading import is_hinge, joints_of, library, read
@@ -144,7 +144,7 @@ class Mujoco(AbstractSimulator):
         time = np.asarray(recording.time, float)
         for number, parts in enumerate(self.columns.along(seen, time)):
             found |= dict(zip(channels_of(number), parts, strict=True))
-        found |= self._neighbours(seen.motion.velocity)
+        found |= self._neighbours(seen)
         soft, gone = self._sticks(seen), self.limited(recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
@@ -158,15 +158,20 @@ class Mujoco(AbstractSimulator):
         sound = {name: jnp.asarray(np.nan_to_num(values)) for name, values in found.items()}
         return np.where(gone, np.nan, seen.force[:, own]), sound
 
-    def _neighbours(self, velocity: Float[np.ndarray, "N dof"]) -> dict[str, np.ndarray]:
-        """The velocities of the other joints that move, m/s or rad/s, by channel."""
-        moving = np.flatnonzero(np.ptp(velocity, axis=0) > 0)
-        units = {
-            i: "rad" if is_hinge(self.mujoco, self.model, i) else "m"
-            for i in moving.tolist()
-            if i != self.number
-        }
-        return {neighbour_channel(self.joints[i], u): velocity[:, i] for i, u in units.items()}
+    def _neighbours(self, seen: inverse.Along) -> dict[str, np.ndarray]:
+        """The velocities of the other joints that move, m/s or rad/s, and the forces that they
+        need, by channel.
+        """
+        moving = np.flatnonzero(np.ptp(seen.motion.velocity, axis=0) > 0)
+        found = {}
+        for i in moving[moving != self.number].tolist():
+            named = self.joints[i], "rad" if is_hinge(self.mujoco, self.model, i) else "m"
+            found[neighbour_channel(*named)] = seen.motion.velocity[:, i]
+            # A machine's dry friction is at its limit as soon as it slips, MuJoCo's a while later.
+            dry = float(self.model.dof_frictionloss[i]) * np.sign(seen.motion.velocity[:, i])
+            parts = seen.rest[:, i] - seen.friction[:, i] + dry, seen.momentum[:, i]
+            found |= dict(zip(force_channels(*named), parts, strict=True))
+        return found
 
     def limited(self, recording: Recording) -> Bool[np.ndarray, " N"]:
         """Where the joint is at a limit of the model, `(N,)`."""

@@ -123,17 +123,36 @@ def linear(mujoco: Any, model: Any, joint: int, seen: Along) -> list[tuple[np.nd
 GRAVITY = tuple(f"option/gravity/{letter}" for letter in "xyz")
 
 
+# Mass and first moment: what of a body gravity pulls on.
+PULLED = 4
+
+
 def by_gravity(mujoco: Any, model: Any, joint: int, seen: Along) -> list[np.ndarray]:
     """A joint's force, `(N,)`, by 1 m/s² of gravity along each axis of the world."""
-    none, *units = np.concatenate([np.zeros((1, 3)), np.eye(3)])
-    found = [np.zeros(len(seen.rest))] * 3
+    found = np.zeros((3, len(seen.rest)))
+    parts = pulled(mujoco, model, joint, seen)
+    bodies = [b for b in range(1, model.nbody) if model.body_mass[b] > 0]
+    for b, own in zip(bodies, np.reshape(parts, (-1, PULLED, 3, len(seen.rest))), strict=True):
+        theta = weight_of(mujoco, model, b).parameters()[:PULLED]
+        found += np.tensordot(theta, own, 1)
+    return list(found)
+
+
+def pulled(mujoco: Any, model: Any, joint: int, seen: Along) -> list[np.ndarray]:
+    """A joint's force, `(N,)`, by 1 m/s² of gravity along each axis of the world on a unit of mass
+    and of first moment of each body with mass, in the order of [`weights`][].
+    """
+    found = []
     for b in range(1, model.nbody):
-        theta, frame = weight_of(mujoco, model, b).parameters(), seen.frames[b - 1]
-        still = rigid.regressor(frame, theta, none)[0][:, joint]
-        found = [
-            whole + rigid.regressor(frame, theta, unit)[0][:, joint] - still
-            for whole, unit in zip(found, units, strict=True)
-        ]
+        if model.body_mass[b] <= 0:
+            continue
+        frame = seen.frames[b - 1]
+        moving, turning = (each[:, :, joint] for each in frame.jacobians)
+        found += [-moving[:, axis] for axis in range(3)]
+        for k in range(3):
+            # J_wᵀ (r × g) is g · (J_w × r), r the frame's own axis.
+            arm = np.cross(turning, frame.rotation[:, :, k])
+            found += [-arm[:, axis] for axis in range(3)]
     return found
 
 

@@ -22,7 +22,7 @@ from .effects.backlash import (
 )
 from .effects.cogging import Cogging as Cogging, ForceRipple as ForceRipple
 from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance
-from .effects.cross_axis import CrossAxis as CrossAxis
+from .effects.cross_axis import CrossAxis as CrossAxis, CrossForce as CrossForce
 from .effects.disturbance_force import DisturbanceForce as DisturbanceForce
 from .effects.disturbance_pulses import DisturbancePulses as DisturbancePulses
 from .effects.end_stop import EndStop as EndStop, LowerEndStop as LowerEndStop

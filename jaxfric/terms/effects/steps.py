@@ -199,15 +199,23 @@ def hanging(
     term: PayloadChange, base: AbstractTerm, turn: float | None
 ) -> tuple[AbstractTerm, ...]:
     """On a turning axis the load's weight goes with the angle; of another simulator's axis it is
-    more mass of the last body, which has the load's place. The weight may rest on something else.
+    more mass of the last body, which has the load's place or moves there. The weight may rest on
+    something else.
     """
     for part in summands(base):
-        masses = [i for i, n in enumerate(getattr(part, "names", ())) if n.endswith("/mass")]
+        names = getattr(part, "names", ())
+        masses = [i for i, name in enumerate(names) if name.endswith("/mass")]
         if isinstance(part, KnownColumns) and masses:
-            return (dataclasses.replace(term, load=part.only(masses[-1])),)
+            body = names[masses[-1]].rpartition("/")[0]
+            loads: list[AbstractTerm] = [part.only(masses[-1])]
+            for values in ("centre_", "inertia_"):
+                own = [i for i, name in enumerate(names) if name.startswith(f"{body}/{values}")]
+                if own:
+                    loads.append(Sum((*summands(loads[-1]), *map(part.only, own))))
+            return tuple(dataclasses.replace(term, load=load) for load in loads)
     weight = Offset() if turn is None else Gravity(turn)
-    loads = Sum((Inertia(), weight)), Inertia()
-    return tuple(dataclasses.replace(term, load=load) for load in loads)
+    either = Sum((Inertia(), weight)), Inertia()
+    return tuple(dataclasses.replace(term, load=load) for load in either)
 
 
 def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
@@ -215,9 +223,13 @@ def weighed(values: Mapping[str, float], extent: Extent) -> str | None:
     mass = next((name for name in values if name.endswith("/mass")), None)
     if mass is not None:
         body = mass.split("/")[1]
-        there = f"if its centre of mass is where that of body {body} is"
         text = f"At t = {{step_time}} the mass of body {body} changes by {{{mass}}}"
-        return f"{text}: {PICKED}, {there}"
+        moved = " and ".join(f"{n[-1]} by {{{n}}}" for n in values if "/centre_" in n)
+        turned = any("/inertia_" in name for name in values)
+        if not moved and not turned:
+            return f"{text}: {PICKED}, if its centre of mass is where that of body {body} is"
+        text += f" and its centre of mass along {moved}" * bool(moved)
+        return f"{text}{' and its inertia' * turned}, or what makes the same force: {PICKED}"
     weight = next((name for name in ("amplitude", "payload_offset") if name in values), None)
     if weight is None:
         return None
