@@ -1766,7 +1766,7 @@ def test_what_is_left_sample_by_sample_and_is_no_noise_is_not_nothing(error, noi
     fit = {"force_error": {"before": error, "after": error}, "noise_floor": noise}
     assert verdict.beside_rows(fit) == missing
     fit |= {"filtered_force_error": {"before": 0.03, "after": 0.03}}
-    said = wording._errors(fit, False, "unexplained" if missing else "consistent")
+    said = wording._by_sample(fit, "unexplained" if missing else "consistent")
     assert ("short events" in said) == (missing and noise**2 < error**2 / 2)
 
 
@@ -1774,7 +1774,7 @@ def test_what_is_left_sample_by_sample_and_is_no_noise_is_not_nothing(error, noi
 def test_more_than_noise_is_not_left_without_a_word_where_nothing_is_missing(error, said):
     fit = {"force_error": {"before": error, "after": error}, "noise_floor": 0.005}
     fit |= {"filtered_force_error": {"before": 0.001, "after": 0.001}}
-    text = wording._errors(fit, False, "consistent")
+    text = wording._by_sample(fit, "consistent")
     assert ("more than that is short" in text) == said
 
 

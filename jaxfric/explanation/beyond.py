@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 
 from ..checks import Remark
 from ..data.excerpt import MOST, SPARE
-from .acceptance import LEAST_SHARE, LINEARITY, OF_BASE
+from .acceptance import LEAST_SHARE, LINEARITY
 from .evidence import LONGEST, Evidence
 from .locate import Structure
 from .nodes import NODES
@@ -22,44 +22,55 @@ from .spectral_lines import NEIGHBOURS, OVERSAMPLING, SPARSE, line_frequencies, 
 ALONE, NEAR = 0.5, 0.1
 
 
-class Samples(NamedTuple):
-    """What a model leaves of the force, sample by sample, `(N,)` each.
+# The name of the remark on such a tone.
+FAST_TONE = "fast_tone"
 
-    `rest` and `force`, N; `time`, s; `counted`: which samples a force error is taken over.
+
+class Samples(NamedTuple):
+    """What a model leaves of the force, at the samples over which a force error is taken, `(C,)`.
+
+    `rest` and `force`, N; `time`, s. Of a long recording the first of them.
     """
 
-    rest: Float[np.ndarray, " N"]
-    force: Float[np.ndarray, " N"]
-    time: Float[np.ndarray, " N"]
-    counted: Bool[np.ndarray, " N"]
+    rest: Float[np.ndarray, " C"]
+    force: Float[np.ndarray, " C"]
+    time: Float[np.ndarray, " C"]
 
-    def without(self, tone: Structure) -> np.ndarray:
-        """What is left without a tone, N, `(N,)`."""
-        turned = 2 * np.pi * tone.peak * (self.time - self.time[0])
-        waves = np.stack([np.sin(turned), np.cos(turned)], axis=1)
-        size = np.linalg.lstsq(waves[self.counted], self.rest[self.counted], rcond=None)[0]
-        return self.rest - waves @ size
+    @classmethod
+    def of(cls, rest, force, time, counted: Bool[np.ndarray, " N"]) -> "Samples":
+        """From the signals of a recording, `(N,)`, and which samples are counted."""
+        some = counted[:MOST]
+        return cls(*(values[: len(some)][some] for values in (rest, force, time)))
 
 
-def tone_beyond(
-    samples: Samples, evidence: Evidence, before: Samples | None = None, seed: int = 0
-) -> Structure | None:
+def without(
+    tone: Structure,
+    rest: Float[np.ndarray, " N"],
+    time: Float[np.ndarray, " N"],
+    counted: Bool[np.ndarray, " N"],
+) -> Float[np.ndarray, " N"]:
+    """What is left, N, `(N,)`, without a tone, by least squares of the counted samples."""
+    turned = 2 * np.pi * tone.peak * (time - time[counted][0])
+    waves = np.stack([np.sin(turned), np.cos(turned)], axis=1)
+    return rest - waves @ np.linalg.lstsq(waves[counted], rest[counted], rcond=None)[0]
+
+
+def tone_beyond(samples: Samples, evidence: Evidence, seed: int = 0) -> Structure | None:
     """The strongest tone above those that the rows are scanned for, if it counts as structure does.
 
     It stands out of its neighbours in the spectrum (Fisher 1929), and random signs of the blocks do
-    not do as well: what rings or hums now and then is no tone. `before`: what is left without the
-    findings; of the amplitude of that a tenth may remain.
+    not do as well: what rings or hums now and then is no tone.
     """
-    rest, force, time, counted = (values[:MOST] for values in samples)
-    if np.count_nonzero(counted) < BLOCKS * NEIGHBOURS or not evidence.clock:
+    rest, force, time = samples
+    if len(rest) < BLOCKS * NEIGHBOURS or not evidence.clock:
         return None
-    cell = np.round((time - time[0]) / np.median(np.diff(time))).astype(int)
+    step = float(np.median(np.diff(time)))
+    cell = np.round((time - time[0]) / step).astype(int)
     if cell[-1] > SPARSE * len(cell):
         return None
-    rest, time, cell = rest[counted], time[counted], cell[counted]
     series = np.zeros(OVERSAMPLING * (int(cell[-1]) + 1))
     series[cell] = rest
-    tones = np.fft.rfftfreq(len(series), float(np.median(np.diff(samples.time[:MOST]))))
+    tones = np.fft.rfftfreq(len(series), step)
     power = np.abs(np.fft.rfft(series)) ** 2
     best = standing_out(tones, power, line_frequencies(evidence, "time")[-1])
     if best is None or not _alone(power, best):
@@ -71,13 +82,14 @@ def tone_beyond(
     p_value = float((1 + np.sum(np.abs(signs @ scores) >= abs(scores.sum()))) / (1 + DRAWS))
     size = float(abs(scores.sum())) * np.sqrt(2) / len(rest)
     share = size**2 / float(np.mean(rest**2))
-    least = LINEARITY * float(np.sqrt(np.mean(force[counted] ** 2)))
-    if before is not None:
-        mismatch = before.rest[:MOST][counted]
-        least = max(least, OF_BASE**0.5 * float(np.sqrt(np.mean(mismatch**2))))
-    if p_value > LEVEL or share < LEAST_SHARE or size < least:
+    if p_value > LEVEL or share < LEAST_SHARE or size < LINEARITY * rms(force):
         return None
     return Structure("time_lines", share, size, p_value, tone, (np.zeros(0), np.zeros(0)))
+
+
+def rms(values: np.ndarray) -> float:
+    """The root mean square."""
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _alone(power: np.ndarray, best: int) -> bool:
@@ -102,10 +114,10 @@ def half_width(tone: Structure, evidence: Evidence) -> int | None:
 
 def remark(tone: Structure, samples: Samples) -> Remark:
     """That a tone is left which no effect was looked for at."""
-    force = float(np.sqrt(np.mean(samples.force[samples.counted] ** 2)))
     text = (
-        f"A tone of {tone.peak:.4g} Hz is left, {tone.size / force:.1%} of the force, too fast for "
-        "the search, which named nothing for it: the loop, the drive's supply or something "
-        "that turns hums so. Look for what runs at that frequency, or log at a higher rate."
+        f"A tone of {tone.peak:.4g} Hz is left, {tone.size / rms(samples.force):.1%} of the force, "
+        "too fast for the search, which named nothing for it: the loop, the drive's supply or "
+        "something that turns hums so. Look for what runs at that frequency, or log at a higher "
+        "rate."
     )
-    return Remark("fast_tone", text, False)
+    return Remark(FAST_TONE, text, False)

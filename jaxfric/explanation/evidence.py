@@ -269,7 +269,8 @@ def _usual(prepared: Recording, slowest: float) -> int:
 
 
 # Nodes that are enough, some four thousand rows whatever the rate: hundreds for each parameter of
-# a model. They are made fewer by a wider kernel, but of no more than a thirty-second of a stroke.
+# a model. They are made fewer by a wider kernel, but of no more than a thirty-second of a stroke,
+# over which the speed of a sine changes by a tenth of its peak.
 ENOUGH, STROKE = 3 << 12, 64
 
 

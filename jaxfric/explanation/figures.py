@@ -15,7 +15,7 @@ from ..data.recording import Recording
 from ..models import Model
 from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
 from ..simulation.prediction import Prepared
-from .beyond import Samples
+from .beyond import Samples, without
 from .counts import answered
 from .locate import Structure
 
@@ -47,6 +47,7 @@ class Figures:
         self._prepared: dict[str, Prepared] = {}
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
+        self._sampled: dict[Hashable, Samples] = {}
         self._errors: dict[Hashable, tuple[float, np.ndarray]] = {}
 
     def held_from(self, place: float) -> None:
@@ -138,10 +139,13 @@ class Figures:
         return left
 
     def samples(self, model: Model) -> Samples:
-        """What a model leaves of the recording, sample by sample."""
-        counted, force = self._samples("here", delay_of(model))
-        time = np.asarray(self._recordings["here"].time, float)
-        return Samples(self._left(model, "here"), force, time, counted)
+        """What a model leaves of the recording, sample by sample; computed once."""
+        key = self._key(model, "here")
+        if key not in self._sampled:
+            counted, force = self._samples("here", delay_of(model))
+            time = np.asarray(self._recordings["here"].time, float)
+            self._sampled[key] = Samples.of(self._left(model, "here"), force, time, counted)
+        return self._sampled[key]
 
     def floor(self, model: Model, lag: float, tone: Structure | None = None) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
@@ -160,7 +164,8 @@ class Figures:
         del steps
         rest = self._left(model, "here")
         whole = relative(rest, force, moving)
-        rest = rest if tone is None else self.samples(model).without(tone)
+        if tone is not None:
+            rest = without(tone, rest, np.asarray(recording.time, float), moving)
         both = moving[count:] & moving[:-count]
         if not both.any():
             return float("nan")

@@ -10,7 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import beyond, parameters as spelled, structure, verification
-from .acceptance import LINEARITY
+from .acceptance import LINEARITY, OF_BASE
 from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, creeping, doubts, not_better
@@ -72,18 +72,14 @@ def summarise(
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(selection, filtered)
-    # Values that are known in both recordings and differ: no one model holds for both. Where a load
-    # of time alone was found, another constant is the same load.
-    of_time = any(EFFECTS[f.effect].coordinates == ("time",) for f in effects)
-    if not (of_time and constant_apart(errors)):
-        missing |= bool(apart and errors.get("holdout_values"))
+    missing |= _values_differ(errors, effects, apart)
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     # In another recording that is compared with, what has no name may be as well.
     seen = better.seen if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     verdict = verdict_of(findings, new, later, much, standing, remarks, seen)
-    there = [*before.counts, *tones]
+    there = sorted([*before.counts, *tones], key=lambda each: -each.share)
     where = structure.documents(there, findings, better.first, units, known.structured)
     if verdict == "unexplained" and not where:
         where = structure.strongest(before, units, known.structured)
@@ -107,11 +103,30 @@ def summarise(
 
 
 def tone_left(findings: Findings, figures: Figures) -> Structure | None:
-    """A tone too fast for the rows that the model with the findings leaves."""
+    """A tone too fast for the rows that the model with the findings leaves.
+
+    Of the amplitude of what there is without them a tenth may remain.
+    """
     selection = findings.selection
     samples = figures.samples(findings.model(selection.last))
-    before = figures.samples(findings.model(selection.base)) if selection.selected else None
-    return beyond.tone_beyond(samples, findings.problem.evidence, before)
+    tone = beyond.tone_beyond(samples, findings.problem.evidence)
+    if tone is None or not selection.selected:
+        return tone
+    before = figures.samples(findings.model(selection.base))
+    return tone if tone.size >= OF_BASE**0.5 * beyond.rms(before.rest) else None
+
+
+def _values_differ(
+    errors: Mapping[str, Any], effects: Sequence[Finding], apart: Sequence[Remark]
+) -> bool:
+    """Whether values are known in both recordings and differ: no one model holds for both.
+
+    Where a load of time alone was found, another constant is the same load.
+    """
+    of_time = any(EFFECTS[f.effect].coordinates == ("time",) for f in effects)
+    if of_time and constant_apart(errors):
+        return False
+    return bool(apart and errors.get("holdout_values"))
 
 
 def _halvable(selection: Selection, filtered: Mapping[str, Any]) -> bool:

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..checks import LEFT
 from ..terms.effects import EFFECTS
+from .beyond import FAST_TONE
 from .fewest import SHAPE, SURE
 from .finding import Finding
 
@@ -50,7 +51,9 @@ def summary(
         words = words | {verdict: REFUTED}
     said = DOUBTED if severe and not findings else words[verdict]
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
-    whole = [*severe, said, *other, *refuted, _errors(fit, bool(findings), verdict)]
+    hums = any(each["name"] == FAST_TONE for each in warnings)
+    errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
+    whole = [*severe, said, *other, *refuted, errors]
     return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit))])
 
 
@@ -62,7 +65,7 @@ def _not_confirmed(findings: Sequence[Finding]) -> str:
     )
 
 
-def _errors(fit: Mapping[str, Any], found: bool, verdict: str) -> str:
+def _errors(fit: Mapping[str, Any], found: bool) -> str:
     """The force errors, and what of them is noise."""
 
     def said(error: Mapping[str, float]) -> str:
@@ -74,7 +77,7 @@ def _errors(fit: Mapping[str, Any], found: bool, verdict: str) -> str:
         text += f"; on the held-out recording{adjusted(fit)} {said(held)}"
     if (floor := fit.get("noise_floor")) is not None and math.isfinite(floor):
         text += f"; {floor:.2%} is what noise alone makes"
-    return f"{text}.{_by_sample(fit, verdict)}"
+    return text
 
 
 # A third of the force, a tenth of its power.
