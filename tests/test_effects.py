@@ -17,7 +17,7 @@ from jaxfric.simulation.control import PD, Encoder
 from jaxfric.simulation.simulating import simulate
 from jaxfric.terms import effects, transmission
 from jaxfric.terms.base import bounds
-from jaxfric.terms.effect import Extent
+from jaxfric.terms.effect import Extent, scattered
 from jaxfric.terms.sample import Scales
 from jaxfric.units import Dimension, spell
 
@@ -461,6 +461,28 @@ def test_a_dry_load_in_slip_swings_as_any_other():
     wanted = np.gradient(viscous.momentum(run)[:, 0], time)
     settled = time > 1.5  # they start at rest and on a wound-up spring
     np.testing.assert_allclose(pull[settled], wanted[settled], atol=0.02 * np.max(np.abs(wanted)))
+
+
+def test_a_load_behind_a_gap_never_gains_speed_of_itself():
+    """Stiff flanks, of which a load passes through a whole gap and back within a step.
+
+    Struck by a flank that moves against it, it comes back with a restitution of e: never faster
+    than (1 + e)/(1 − e) times the motor.
+    """
+    time = np.arange(4000) / 2000
+    speed = 0.15 * np.sign(np.sin(7 * time)) + 1e-4 * np.sin(900 * time)
+    run = Recording(time, 0 * time, np.cumsum(speed) / 2000, speed)
+    fastest = float(np.max(np.abs(speed)))
+    shapes = np.array([1e-8, 1e-8, 0.5]) * 1e4 ** scattered(512, 3)
+
+    def most(shape):
+        gap, windup, slow = shape
+        omega = jnp.sqrt(slow / windup)
+        return jnp.max(jnp.abs(transmission.load_motion(run, omega, 0.2, slow, gap)[1]))
+
+    found = np.asarray(jax.jit(lambda some: jax.lax.map(most, some, batch_size=64))(shapes))
+    back = np.exp(-np.pi * 0.2 / np.sqrt(1 - 0.2**2))
+    assert np.all(found <= (1 + back) / (1 - back) * fastest)
 
 
 def test_slow_backlash_unwinds_crosses_and_winds_up_again():

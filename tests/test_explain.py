@@ -520,6 +520,18 @@ def gain_and_hurdle(scan):
     return scan.gain[scan.best], significance.thresholds(scan.drawn[None], significance.LEVEL)[0]
 
 
+def test_a_law_without_a_finite_force_at_one_point_of_its_grid_competes_at_the_others():
+    at, block = np.linspace(0, 1, 650), significance.evenly(650, 24)
+    residual = np.sin(40 * at) + 0.1 * np.random.default_rng(0).normal(size=650)
+    basis = np.linalg.qr(np.ones((650, 1)))[0]
+    raw = np.sin(np.array([30.0, 40.0, 50.0, 60.0])[:, None] * at)[:, :, None]
+    raw[0, 100], raw[2, 7], raw[3, 7:] = np.nan, np.inf, 1e308
+    fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
+    scan = significance.BlockBootstrap(fit, block)(candidates.scaled(raw))
+    assert scan.best == 1 and scan.gain[1] > 0.9
+    assert np.all(np.isfinite(scan.gain)) and list(scan.dimension) == [0, 1, 0, 1]
+
+
 def test_a_tone_does_not_raise_its_own_hurdle():
     """Flipped by blocks, most of it would be a tone nearby."""
     for seed in range(6):

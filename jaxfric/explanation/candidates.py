@@ -166,10 +166,13 @@ def _signals(motion: Recording) -> dict[str, Any]:
 def scaled(raw: np.ndarray) -> np.ndarray:
     """Columns `(G, J, k)` as the bootstrap reads them: largest value one, `(G, k, J)`, float32.
 
-    In place where they are float32.
+    In place where they are float32. Where a law has no finite force it adds nothing.
     """
     columns = raw.transpose(0, 2, 1)
     size = np.maximum(columns.max(axis=2), -columns.min(axis=2))[..., None]
+    nowhere = ~np.isfinite(size).all(axis=(1, 2))
+    if nowhere.any():
+        columns[nowhere], size[nowhere] = 0.0, 0.0
     result = columns if columns.dtype == np.float32 else np.empty(columns.shape, np.float32)
     return np.divide(columns, np.where(size > 0, size, 1.0), out=result, casting="same_kind")
 

@@ -116,7 +116,8 @@ def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
     """One step of a load behind a gap, whose flanks do not pull.
 
     A load in touch swings until the flank would pull, and then it flies; one that flies may strike
-    a flank, and swings from then on.
+    a flank, and swings from then on. One that has left a flank is stopped by the opposite one until
+    the next step: from inside of it, it would come back with more speed than it had.
     """
     ahead, load = state
     place = jnp.sign(ahead)
@@ -157,7 +158,10 @@ def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
     load = jnp.where(met, facing * speed, load)
     impulse = jnp.where(met, facing * impulse, 0.0)
     rest = jnp.where(leaves, span - time, 0.0)
-    return flank.flying(ahead, load, now + gain * time, gain, rest), impulse
+    begun = jnp.where(met | (place == 0), facing, place)
+    ahead, load = flank.flying(ahead, load, now + gain * time, gain, rest)
+    ahead = begun * jnp.maximum(begun * ahead, -half_gap)
+    return (ahead, load), impulse
 
 
 def load_motion(
