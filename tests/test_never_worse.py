@@ -17,15 +17,18 @@ from jaxfric.explanation import (
     doubts,
     explain,
     explaining,
+    finding,
     improvement,
     least_squares,
     regression,
+    wording,
 )
 from jaxfric.explanation.improvement import Errors
 from jaxfric.explanation.parameters import may_be_none
 from jaxfric.explanation.problem import problem_of
 from jaxfric.explanation.wording import DOUBTED
 from jaxfric.identification.uncertainty import Estimate
+from jaxfric.report import advice
 from jaxfric.simulation.errors import delay_of, force_error, in_motion, outliers
 from jaxfric.simulation.prediction import Prepared
 from jaxfric.terms.effects import EFFECTS
@@ -601,3 +604,60 @@ def test_a_recording_made_after_a_change_confirms_it():
     held = found.fit["holdout_force_error"]
     assert held["after"] < 0.2 * held["before"]
     assert found.fit["holdout_adjusted"]["changed_before"] == [step.effect]
+
+
+def improved_by(filtered, names=(), dropped=(), spoilt=None, seen=None, shown="shown"):
+    """An answer whose rows are left with a part of the force, and what it had dropped."""
+    before, after = (Errors(0.1, None, left, None) for left in (0.1, filtered))
+    selection = types.SimpleNamespace(names=list(names), selected=list(names), forms=set(names))
+    found = types.SimpleNamespace(selection=selection)
+    spoilt = None if spoilt is None else Errors(0.2, None, spoilt, None)
+    seen = dropped if seen is None else seen
+    return improvement.Improved(
+        None, found, False, before, after, tuple(dropped), spoilt, tuple(seen),
+        shown if dropped else None,
+    )  # fmt: skip
+
+
+GAP = improved_by(0.1, dropped=["backlash"], spoilt=0.03)
+
+
+@pytest.mark.parametrize(
+    "first, instead, stands",
+    [(GAP, improved_by(0.05, ["compliance"]), True),
+     (GAP, improved_by(0.031, ["compliance"]), False),
+     (GAP, improved_by(0.05, ["backlash"]), False),
+     (GAP, improved_by(0.1), False),
+     (GAP._replace(seen=()), improved_by(0.05, ["compliance"]), False)],
+    ids=["fits less", "fits as well", "another law of it", "nothing", "as noise"],
+)  # fmt: skip
+def test_what_fits_less_than_what_was_dropped_is_not_named_instead(
+    monkeypatch, first, instead, stands
+):
+    """The rows have the shape of a gap, whose blows come a little beside those of the log."""
+    rounds = iter([first, instead])
+
+    def found(motion, problem, seed, refused):
+        forms = {"gap"} if not refused else set(instead.findings.selection.names)
+        return types.SimpleNamespace(selection=types.SimpleNamespace(forms=frozenset(forms)))
+
+    monkeypatch.setattr(explaining, "searched", found)
+    monkeypatch.setattr(explaining, "_judged", lambda *_: (None, next(rounds)))
+    _, better = explaining._found(None, None, None, None, 0, lambda _: None)
+    assert (better is first) == stands
+    assert stands or better.shown is None
+    assert stands or better.findings is instead.findings
+
+
+def test_what_the_rows_show_and_no_sample_is_told_as_not_in_the_model():
+    gap = finding.Finding(
+        "backlash", "", "A gap.", (), "", {}, 0.8, None, 0.002, confirmed=None
+    )  # fmt: skip
+    fit = {"force_error": {"before": 0.14, "after": 0.14}, "noise_floor": 0.06}
+    said = wording.summary("unexplained", "gaussian", [], [gap], fit, [])
+    assert said.startswith(wording.SHAPED) and "held-out" not in said
+    document = {"verdict": "unexplained", "not_confirmed": [gap._asdict()], "findings": []}
+    assert any("Look at the machine for backlash" in step for step in advice.steps(document))
+    refuted = gap._replace(confirmed=False)
+    said = wording.summary("unexplained", "gaussian", [], [gap, refuted], fit, [])
+    assert said.startswith(wording.REFUTED)

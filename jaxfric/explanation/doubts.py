@@ -205,10 +205,11 @@ def _most(error: float) -> str:
     return f"{error**2:.0%}" if np.isfinite(error) and error < 1 else "All"
 
 
-def not_better(gone: tuple[str, ...], before: Any, spoilt: Any) -> Remark:
+def not_better(gone: tuple[str, ...], before: Any, spoilt: Any, named: bool = False) -> Remark:
     """That findings went since the model with them is worse than the baseline.
 
-    `before`, `spoilt`: the [`Errors`][jaxfric.explanation.improvement] of both.
+    `before`, `spoilt`: the [`Errors`][jaxfric.explanation.improvement] of both; `named`: whether
+    what went is told with its sizes.
     """
     names = " and ".join(name.replace("_", " ") for name in gone)
     figures = {
@@ -225,7 +226,7 @@ def not_better(gone: tuple[str, ...], before: Any, spoilt: Any) -> Remark:
     return Remark(
         NOT_BETTER,
         f"The structure that was seen has the shape of {names}, but with that the model is worse: "
-        f"it takes {' and '.join(changes)}. It is neither named nor saved.",
+        f"it takes {' and '.join(changes)}. It is {'not' if named else 'neither named nor'} saved.",
         False,
     )
 

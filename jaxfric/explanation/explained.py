@@ -27,7 +27,8 @@ class Explanation:
     - `verdict`: "consistent", "explained", "partly_explained" or "unexplained".
     - `where`: coordinates on which the baseline's residual has structure, the strongest first.
     - `findings`: the missing physics, the strongest first; `not_confirmed`: what this recording
-      shows and the held-out one does not confirm, which is not in the model. The held-out
+      shows and the held-out one does not confirm, or, with `confirmed` as `None`, what its rows
+      show and makes the model worse sample by sample; it is not in the model. The held-out
       recording says nothing else: all is looked for and fitted without it.
     - `fit`: force errors before and after, on the recording and on the held-out one.
     - `not_visible`: the smallest size of each other effect that this recording would have shown.

@@ -22,12 +22,13 @@ from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
 from .holdout import check_signals, confirmed, measured
-from .improvement import Improved, improved, without_unsure
+from .improvement import Errors, Improved, improved, without_unsure
 from .inputs import Inputs, prepare
 from .mismatch import Mismatch, mismatch
 from .motion import Motion, motion_of
 from .parsimony import instead
 from .problem import Problem, problem_of, with_holdout
+from .rivals import NO_EVIDENCE
 from .search import at_given, nothing, obeying, searched
 from .summary import facts, summarise, tone_left
 from .uncertainty import estimated
@@ -198,18 +199,41 @@ def _found(
 ) -> tuple[Mismatch | None, Improved]:  # fmt: skip
     """What is missing and which values are wrong, by laws that do not make the model worse.
 
-    A law may fit the rows and go astray beside them, where another of its effect does not.
+    A law may fit the rows and go astray beside them, where another of its effect does not. What is
+    found instead and fits the rows less has the wrong name.
     """
-    refused, rounds = frozenset[Hashable](), list[Improved]()
+    refused, rounds = frozenset[Hashable](), list[tuple[Mismatch | None, Improved]]()
     while True:
         doing("looking for what is missing")
         findings = searched(motion, problem, seed, refused)
         wrong, better = _judged(known, findings, inputs, doing, seed)
-        rounds.append(better)
+        rounds.append((wrong, better))
         gone = findings.selection.forms - better.findings.selection.forms
         if not better.dropped or gone <= refused:  # a late force is looked for in another way
-            return wrong, better if len(rounds) == 1 else _with_dropped(better, rounds)
+            break
         refused |= gone
+    first = rounds[0][1]
+    if len(rounds) == 1:
+        return wrong, better
+    if first.shown is not None and _stands_in(better, first):
+        return rounds[0]
+    better = _with_dropped(better, [each for _, each in rounds])
+    return wrong, better._replace(shown=None)
+
+
+def _stands_in(better: Improved, first: Improved) -> bool:
+    """Whether what was found instead of effects that were dropped has less than nine tenths of the
+    evidence for them: by the logarithms of what both leave of the rows.
+    """
+    if not first.seen or set(first.dropped) & set(better.findings.selection.names):
+        return False
+    if not better.findings.selection.selected or first.spoilt is None:
+        return False
+
+    def evidence(errors: Errors) -> float:
+        return float(np.log(first.before.filtered / max(errors.filtered, 1e-300)))
+
+    return evidence(better.after) < NO_EVIDENCE * evidence(first.spoilt)
 
 
 def _with_dropped(better: Improved, rounds: list[Improved]) -> Improved:

@@ -57,8 +57,8 @@ class Improved(NamedTuple):
     """What is reported: the baseline, the findings that remain, and both models' errors.
 
     - `first`: the fit of the baseline; `refitted`: whether its values are others than those given.
-    - `dropped`: effects whose findings were dropped, as the model with them is worse; `spoilt`: its
-      errors; `seen`: those of them that noise is not.
+    - `dropped`: effects whose findings were dropped, as the model with them is worse; `shown`: the
+      findings with those; `spoilt`: the errors of that model; `seen`: those that noise is not.
     - `claimed`: the findings that the recording shows, of which the held-out recording does not
       confirm those of the numbers `refuted`; `worse`: the errors before and with them, where what
       each of them removes there is confirmed, but the model with them is worse.
@@ -72,6 +72,7 @@ class Improved(NamedTuple):
     dropped: tuple[str, ...] = ()
     spoilt: Errors | None = None
     seen: tuple[str, ...] = ()
+    shown: Findings | None = None
     claimed: Findings | None = None
     refuted: tuple[int, ...] = ()
     worse: tuple[Errors, Errors] | None = None
@@ -119,10 +120,11 @@ def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
         else:
             findings = min(fewer, key=lambda some: _here(some, figures))
     dropped = _dropped(claimed, findings)
+    shown = claimed if dropped else None
     if spoilt is not None and not dropped:
         dropped = (MISMATCH,)
     seen = tuple(name for name in dropped if not _as_noise(name, claimed))
-    return Improved(first, findings, refitted, before, after, dropped, spoilt, seen)
+    return Improved(first, findings, refitted, before, after, dropped, spoilt, seen, shown)
 
 
 def _as_noise(name: str, found: Findings) -> bool:

@@ -73,15 +73,29 @@ def _instead(selected: SelectedTerm) -> dict[str, tuple[str, ...]]:
 
 
 def not_confirmed(better: Improved) -> list[Finding]:
-    """What this recording shows and the held-out one does not confirm."""
+    """What this recording shows and the held-out one does not confirm, and what its rows show with
+    which the model is worse sample by sample.
+    """
+    shown = [] if better.shown is None else _beside_rows(better)
     if not better.refuted:
-        return []
+        return shown
     every, _ = reported(better.claimed, better.first)
-    return [
+    return shown + [
         every[n]._replace(
             confirmed=False, sentence=f"{every[n].sentence}{_reason(every[n], better)}"
         )
         for n in better.refuted
+    ]
+
+
+def _beside_rows(better: Improved) -> list[Finding]:
+    """What the rows show and was dropped: the held-out recording has no say."""
+    every, _ = reported(better.shown, better.first)
+    why = " Sample by sample the model with it is worse: it is not in the model."
+    return [
+        finding._replace(sentence=f"{finding.sentence}{why}")
+        for finding in every
+        if finding.effect in better.dropped
     ]
 
 

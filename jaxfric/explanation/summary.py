@@ -173,7 +173,8 @@ def _doubts(better: Improved) -> list[Remark]:
     if problem.creeps:
         remarks.append(creeping(problem))
     if better.spoilt is not None and better.seen:
-        remark = not_better(better.dropped, better.before, better.spoilt)
+        named = better.shown is not None
+        remark = not_better(better.dropped, better.before, better.spoilt, named)
         late = any(EFFECTS[name].late for name in better.dropped)
         if late and not evidence.located:
             remark = remark._replace(text=f"{remark.text} {NO_POSITION}")

@@ -31,6 +31,8 @@ CHANGES = {
 
 # Of `unexplained`, where the held-out recording does not bear out what would account for it here.
 REFUTED = "Something is missing, and no effect accounts for it in both recordings."
+# Of `unexplained`, where a model with what would account for it is worse sample by sample.
+SHAPED = "Something is missing, and the model is not better with what accounts for it."
 # Instead of a verdict's words, where what was measured contradicts itself.
 DOUBTED = "Until that is put right, nothing is named."
 
@@ -47,8 +49,12 @@ def summary(
     severe = [each["text"] for each in warnings if each["severe"]]
     other = [each["text"] for each in warnings if each["name"] == "not_better"]
     words = CHANGES if baseline.startswith("recording") else VERDICTS
+    shaped = any(finding.confirmed is None for finding in not_confirmed)
+    not_confirmed = [finding for finding in not_confirmed if finding.confirmed is False]
     if verdict == "unexplained" and not_confirmed:
         words = words | {verdict: REFUTED}
+    elif shaped:
+        words = words | {"unexplained": SHAPED}
     said = DOUBTED if severe and not findings else words[verdict]
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
     hums = any(each["name"] == FAST_TONE for each in warnings)

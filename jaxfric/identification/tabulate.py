@@ -264,10 +264,17 @@ def explained(document: Mapping[str, Any]) -> list[Block]:
     baseline = [f"baseline {document['baseline']['name']}"]
     findings = [_finding(finding) for finding in document["findings"]]
     findings += [
-        [f"{finding['effect']}, not confirmed", f"  {finding['sentence']}"]
+        [
+            f"{finding['effect']}, not {_NOT[finding['confirmed']]}",
+            f"  {finding['sentence']}",
+        ]
         for finding in document.get("not_confirmed", [])
     ]
     return [source, baseline, said, *_sanity(document), *findings, *_places(document)]
+
+
+# Of what the held-out recording refutes, and of what it has no say in.
+_NOT = {False: "confirmed", None: "in the model"}
 
 
 def _sanity(document: Mapping[str, Any]) -> list[Block]:

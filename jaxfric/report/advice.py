@@ -47,7 +47,7 @@ def headline(document: Mapping[str, Any]) -> str:
         "unexplained": "Something is missing"
         + (
             ", and no effect accounts for it in both recordings"
-            * bool(document.get("not_confirmed"))
+            * any(each["confirmed"] is False for each in document.get("not_confirmed") or ())
             or " that no effect of the library accounts for"
         )
         + (f", most of it over {where[0]}" if where else "")
@@ -94,10 +94,13 @@ def steps(document: Mapping[str, Any]) -> list[str]:
             "the answer holds on data that it was not fitted to."
         )
     for finding in document.get("not_confirmed") or ():
+        name = spoken(finding["effect"])
         found.append(
-            f"What looks like {spoken(finding['effect'])} here does not make the model better on "
-            "the held-out recording, and is not in the model: record both motions once more, to "
-            "see which holds."
+            f"What looks like {name} here does not make the model better on the held-out "
+            "recording, and is not in the model: record both motions once more, to see which holds."
+            if finding["confirmed"] is False
+            else f"Look at the machine for {name}: the recording has the shape of it, but a model "
+            "with it does not meet the force sample by sample."
         )
     for finding in findings:
         if finding.get("confusable_with"):
