@@ -17,7 +17,7 @@ from jaxfric.simulation.control import PD, Encoder
 from jaxfric.simulation.simulating import simulate
 from jaxfric.terms import effects, transmission
 from jaxfric.terms.base import bounds
-from jaxfric.terms.effect import Extent, scattered
+from jaxfric.terms.effect import ANY, PASSED, Extent, View, scattered
 from jaxfric.terms.sample import Scales
 from jaxfric.units import Dimension, spell
 
@@ -719,3 +719,14 @@ def test_a_wave_has_amplitude_and_phase():
     assert float(found.amplitude_error) == pytest.approx(np.std(np.hypot(*draws.T)), rel=0.03)
     phases = np.arctan2(draws[:, 1], draws[:, 0])
     assert float(found.phase_error) == pytest.approx(np.std(phases), rel=0.03)
+
+
+def test_a_load_swings_below_the_first_zero_of_the_kernel():
+    tau = np.linspace(-1, 1, 20_001)
+    passed = [np.mean((1 - tau**2) ** 4 * np.cos(2 * np.pi * f * tau)) for f in (0, PASSED, 1.7)]
+    assert abs(passed[1]) < 1e-4 * passed[0] and abs(passed[2]) < 0.01 * passed[0]
+    view = View(ANY._replace(duration=20.0, interval=1e-3), 0.018, 6, 1.0, 1.0)
+    fastest = effects.EFFECTS["compliance"].grid(T.Compliance(), view)[:, 0].max()
+    assert fastest == pytest.approx(PASSED / 0.018)
+    term = T.Compliance(driven="both")
+    assert term.burden(np.array([70.0, 0.1]), np.array([2.0, 8.0])).resonance == 70.0

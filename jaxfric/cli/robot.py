@@ -10,9 +10,11 @@ from ..data.provenance import sha256
 from ..data.targets import standard
 from ..explanation import Explanation
 from ..explanation.contradictions import CONTRADICTION, with_contradictions
+from ..explanation.springs import DOUBTED
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
+from ..simulators import elastic
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import joint_columns, robot_text
@@ -21,8 +23,11 @@ from .messages import say
 from .robot_joints import Joint, checked_logs, explained, opened
 from .saving import saved
 from .together import loaded, together
+from .transmissions import Answer, with_springs
 
 SCHEMA = "jaxfric.robot/1"
+# Warnings that say why values are not sure.
+DOUBTS = (CONTRADICTION, DOUBTED)
 
 
 def run(arguments: Namespace) -> int:
@@ -31,17 +36,18 @@ def run(arguments: Namespace) -> int:
         page.library()
     mujoco = library()
     model = read_model(mujoco, arguments.mujoco)
-    joints = joints_of(mujoco, model)
+    joints = elastic.logged(mujoco, model, joints_of(mujoco, model))
     if arguments.joint and arguments.joint not in joints:
         raise ValueError(
             f"{arguments.mujoco}: there is no joint {arguments.joint!r}. Its joints are "
             f"{', '.join(joints)}."
         )
-    found = _explained(arguments, mujoco, model, joints)
+    answer = _explained(arguments, mujoco, model, joints)
+    found = answer.joints
     done = [joint for joint in found if joint.told is not None]
     if not done:
         raise ValueError(found[0].error)
-    patch_ = _patched(arguments, done)
+    patch_ = _patched(arguments, answer, done)
     texts = _written(arguments, found, patch_)
     for path, text in texts.items():
         put(path, text)
@@ -50,38 +56,45 @@ def run(arguments: Namespace) -> int:
     return 0
 
 
-def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str]) -> list[Joint]:
-    """The joints of the log, each by itself; then what all say of the bodies together."""
+def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str]) -> Answer:
+    """The joints of the log, each by itself; then what all say of the bodies together, and whether
+    a transmission gives.
+    """
     paths = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
     logged = joint_columns.logged(arguments, joints)
     joint_columns.check_save(arguments.save, logged.chosen)
     shared: dict[bytes, Any] = {}
-    hinges = {name: is_hinge(mujoco, model, joints.index(name)) for name in joints}
+    numbers = {name: i for i, name in enumerate(joints_of(mujoco, model))}
+    hinges = {name: is_hinge(mujoco, model, numbers[name]) for name in joints}
     with working(f"explaining {arguments.file}") as doing:
-        doing("signs, zeros, clocks and limits of all joints")
-        there = {
-            name: opened(name, shared, paths, logged, arguments, hinges[name])
-            for name in logged.chosen
-        }
-        checked = checked_logs(there)
-        found = []
-        for name in logged.chosen:
-            doing(f"joint {name}")
-            found.append(explained(there[name], checked, arguments.mujoco, shared, arguments))
-        doing("the bodies, by all joints")
-        found = loaded(together(there, found, checked, shared, arguments))
-        told = with_contradictions({j.name: j.told for j in found if j.told is not None})
-        found = [joint._replace(told=told.get(joint.name)) for joint in found]
+
+        def by(source: str) -> list[Joint]:
+            doing("signs, zeros, clocks and limits of all joints")
+            there = {
+                name: opened(name, shared, paths, logged, arguments, hinges[name], source)
+                for name in logged.chosen
+            }
+            checked = checked_logs(there)
+            found = []
+            for name in logged.chosen:
+                doing(f"joint {name}")
+                found.append(explained(there[name], checked, source, shared, arguments))
+            doing("the bodies, by all joints")
+            found = loaded(together(there, found, checked, shared, arguments, source))
+            told = with_contradictions({j.name: j.told for j in found if j.told is not None})
+            return [joint._replace(told=told.get(joint.name)) for joint in found]
+
+        answer = with_springs(by, arguments, doing)
     without = [Joint(name, None, why, [], None, []) for name, why in logged.without.items()]
-    return [*found, *without]
+    return answer._replace(joints=[*answer.joints, *without])
 
 
-def _patched(arguments: Namespace, done: list[Joint]) -> Patch | None:
+def _patched(arguments: Namespace, answer: Answer, done: list[Joint]) -> Patch | None:
     """The simulator's file with what was found, if one was asked for."""
     if not arguments.save or not arguments.save.lower().endswith(".xml"):
         return None
     return patch(
-        arguments.mujoco,
+        answer.source,
         {joint.name: joint.told for joint in done if joint.told is not None},
         {joint.name: joint.logs for joint in done},
         arguments.save,
@@ -90,6 +103,7 @@ def _patched(arguments: Namespace, done: list[Joint]) -> Patch | None:
             {joint.name: joint.commanded for joint in done if joint.commanded is not None},
             {joint.name: joint.reference for joint in done if joint.reference is not None},
         ),
+        arguments.mujoco,
     )
 
 
@@ -121,7 +135,7 @@ def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
         "still": list(joint.still),
-        "contradicted": [w["text"] for w in joint.told.warnings if w["name"] == CONTRADICTION],
+        "contradicted": [w["text"] for w in joint.told.warnings if w["name"] in DOUBTS],
         **written,
     }
 

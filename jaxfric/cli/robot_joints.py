@@ -40,14 +40,16 @@ class Joint(NamedTuple):
 
 
 def opened(
-    name: str, shared, paths: Sequence[str], logged: Logged, arguments: Namespace, hinge: bool
-) -> Joint:
-    """One joint's recordings and simulator, not explained yet."""
+    name: str, shared, paths: Sequence[str], logged: Logged, arguments: Namespace, hinge: bool,
+    source: str | Path,
+) -> Joint:  # fmt: skip
+    """One joint's recordings and simulator by a model's file or text, not explained yet."""
     logs, notes = list[Recording](), list[str]()
     reference: np.ndarray | None = None
     try:
         commanded = COMMAND in logged.columns[0].get(name, arguments.columns)
-        simulator = Mujoco(arguments.mujoco, name, shared=shared, commanded=commanded)
+        folder = folder_of(arguments.mujoco)
+        simulator = Mujoco(source, name, folder, shared, commanded=commanded)
         still = simulator.references(logged.still)
         for path, own in zip(paths, logged.columns, strict=True):
             log, more = _log(path, name, own, arguments, hinge)

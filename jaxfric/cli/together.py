@@ -8,6 +8,7 @@ from ..explanation.agreement import Agreement, Told, agreed, with_bodies
 from ..explanation.attributes import CONSTANT
 from ..explanation.loads import with_load
 from ..explanation.sanity import CheckedSimulator
+from ..export.patch import SHARED
 from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched, with_inertial
 from ..terms.effects import EFFECTS
@@ -17,7 +18,7 @@ from .robot_joints import Joint, explained
 
 def together(
     opened: Mapping[str, Joint], found: Sequence[Joint],
-    checked: Mapping[str, CheckedSimulator], shared, arguments: Namespace,
+    checked: Mapping[str, CheckedSimulator], shared, arguments: Namespace, source: str,
 ) -> list[Joint]:  # fmt: skip
     """The joints with one answer for the bodies that they move, and for gravity.
 
@@ -25,24 +26,24 @@ def together(
     of bodies and of gravity that explain them all; with these the joints are explained again, each
     by what is its own. Where the file does not take the values, or a joint is left with clearly
     more than by its own answer, the joints' own answers stand: what they contradict each other in
-    is not written.
+    is not written. `source`: the model's file, or its text.
     """
     able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
     if not any(_of_bodies(joint) or _as_a_weight(joint) for joint in able):
         return list(found)
-    mujoco = library()
+    mujoco, folder = library(), folder_of(arguments.mujoco)
     told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
-    agreement = agreed(told, with_inertial(mujoco, arguments.mujoco))
-    done = patched(mujoco, arguments.mujoco, agreement.values(), folder_of(arguments.mujoco))
+    agreement = agreed(told, with_inertial(mujoco, source, folder))
+    done = patched(mujoco, source, agreement.values(), folder)
     if done.left:
         return list(found)
-    source = done.text if agreement.parameters else arguments.mujoco
+    source = done.text if agreement.parameters else source
     names = [joint.name for joint in able]
     again = []
     for joint in found:
         if joint in able and (_of_bodies(joint) or _moves(joint, agreement)):
             new = explained(opened[joint.name], checked, source, shared, arguments, settled=True)
-            if _clearly_more(new, joint):
+            if clearly_more(new, joint):
                 return list(found)
             joint = _joined(joint, new, agreement, names)
         again.append(joint)
@@ -57,7 +58,7 @@ def loaded(found: Sequence[Joint]) -> list[Joint]:
     return [joint._replace(told=new.get(joint.name, joint.told)) for joint in found]
 
 
-def _clearly_more(new: Joint, own: Joint) -> bool:
+def clearly_more(new: Joint, own: Joint) -> bool:
     """Whether an answer leaves more of a joint's force than its own does, on every recording, by
     more than a sensor of force resolves.
     """
@@ -73,10 +74,15 @@ def _of_bodies(joint: Joint) -> list[str]:
     return [key for key in _wrong(joint) if key.startswith("body/")]
 
 
-def _wrong(joint: Joint) -> list[str]:
+def shared(joint: Joint) -> set[str]:
+    """The values of bodies and of gravity that a joint's answer has wrong."""
+    return {key for key in _wrong(joint) if key.startswith(SHARED)}
+
+
+def _wrong(joint: Joint) -> set[str]:
     """The values that a joint by itself finds wrong, those that it cannot tell too."""
     findings = joint.told.findings if joint.told else []
-    return [key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)]
+    return {key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)}
 
 
 def _as_a_weight(joint: Joint) -> bool:

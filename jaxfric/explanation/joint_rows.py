@@ -33,6 +33,7 @@ class JointRows(NamedTuple):
       then of gravity along each axis on a unit of mass and of first moment of each body;
       `target` `(J,)`: what the simulator, as given, leaves; `block` of each row, `(J,)`.
     - `enough`: the energy below which no sensor of force tells anything, in units of the noise's.
+    - `noise`, N or N·m, and the `evidence` that the rows are of, where it is known.
     """
 
     name: str
@@ -41,6 +42,8 @@ class JointRows(NamedTuple):
     target: np.ndarray
     block: np.ndarray
     enough: float
+    noise: float = 1.0
+    evidence: Evidence | None = None
 
 
 class Opened(NamedTuple):
@@ -56,7 +59,9 @@ class Opened(NamedTuple):
     shared: KnownColumns
 
 
-def opened(simulator: Mujoco, log: Recording, delay: float, wide: int = 1) -> Opened:
+def opened(
+    simulator: Mujoco, log: Recording, delay: float, wide: int = 1, width: int | None = None
+) -> Opened:
     """A joint's evidence, by a simulator as given; the arguments as of [`joint_rows`][]."""
     seen = simulator.along(log)
     of = simulator.mujoco, simulator.model, simulator.number, seen
@@ -71,7 +76,7 @@ def opened(simulator: Mujoco, log: Recording, delay: float, wide: int = 1) -> Op
     for number, pair in enumerate(parts):
         channels |= dict(zip(channels_of(first + number), map(jnp.asarray, pair), strict=True))
     motion = motion_of(cast(dataclasses.replace(beside, channels=channels)))
-    evidence = gather(motion, delay=delay)
+    evidence = gather(motion, width, delay=delay)
     if wide > 1:
         evidence = gather(motion, wide * evidence.width, delay, half=wide * NODES)
     every = KnownColumns(tuple(simulator.attributes()), ("1",) * first)
@@ -85,15 +90,17 @@ def opened(simulator: Mujoco, log: Recording, delay: float, wide: int = 1) -> Op
 
 
 def joint_rows(
-    simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float, wide: int = 1
-) -> JointRows:
+    simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float,
+    wide: int = 1, width: int | None = None,
+) -> JointRows:  # fmt: skip
     """The rows of a joint.
 
     **Arguments:** `simulator` as given, `log` `(N,)`; `found`, the model of the joint's own
     explanation, whose missing physics stands beside; `delay`, s, by which the force is taken later;
-    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width.
+    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width, or
+    how many times `width`, samples in half of it.
     """
-    evidence, names, own, shared = opened(simulator, log, delay, wide)
+    evidence, names, own, shared = opened(simulator, log, delay, wide, width)
     columns = np.concatenate([own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
     basis = physics(found, evidence)
     columns = columns - basis @ (basis.T @ columns)
@@ -102,7 +109,9 @@ def joint_rows(
     noise = max(float(np.sqrt(np.mean(left**2))), 1e-300)
     enough = (linearity / noise) ** 2 * float(evidence.force @ evidence.force)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    return JointRows(simulator.joint, names, columns / noise, target / noise, block, enough)
+    return JointRows(
+        simulator.joint, names, columns / noise, target / noise, block, enough, noise, evidence
+    )
 
 
 def physics(

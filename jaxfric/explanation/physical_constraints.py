@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from ..identification.uncertainty import Estimate
 from ..terms.base import leaves
+from ..terms.effect import PASSED
 from ..terms.effects import traits
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
@@ -64,7 +65,9 @@ def physical(finalist: Finalist, current: Fit, evidence: Evidence) -> bool:
     """Whether a candidate beside the rest of the model keeps the constraints.
 
     A load on a spring or behind a gap has a part of the inertia and of the friction, and does not
-    rest while the motor moves by a tenth of the stroke: that would be a spring to the ground.
+    rest while the motor moves by a tenth of the stroke: that would be a spring to the ground. It
+    swings where the kernel passes a force: a resonance above shows by its tail alone, the second
+    derivative of the acceleration, and what smooths a position or a force makes that too.
     Friction that follows speed late follows a Stribeck curve that shows in steady slip too.
     """
     burden = finalist.trial.candidate.term.burden(finalist.betas[-1], finalist.alpha)
@@ -72,6 +75,8 @@ def physical(finalist: Finalist, current: Fit, evidence: Evidence) -> bool:
         return True
     bumps = any(isinstance(leaf, AbstractBump) for t in current.terms for leaf in leaves(t))
     if burden.curved and not bumps:
+        return False
+    if burden.resonance * evidence.reach > PASSED:
         return False
     if burden.give and burden.give > 0.1 * (evidence.limits.high - evidence.limits.low):
         return False

@@ -15,7 +15,7 @@ from ..models import Model
 from ..simulators import Mujoco, actuation
 from ..simulators.columns import GAIN
 from ..simulators.loading import library
-from ..simulators.patching import Patched, folder_of, patched
+from ..simulators.patching import Patched, folder_of, patched, text_of
 from ..simulators.weights import MASS, MASS_ALONE
 from ..terms import KnownColumns, KnownForce
 from ..terms.base import AbstractTerm, Sum
@@ -28,6 +28,7 @@ from .errors import as_read, from_to, miss, reached, worse
 from .held import kept
 from .parts import Part
 from .rerun import Rerun, rerun
+from .springs import new_springs
 
 
 class Again(NamedTuple):
@@ -90,20 +91,23 @@ def patch(
     recordings: dict[str, list[Recording]],
     name: str,
     again: Again | None = None,
+    given: str | Path | None = None,
 ) -> Patch:
     """The simulator's file with the findings of its joints.
 
     The file is read again as it was written. Values with which a joint is worse than before, on any
     recording, are not written: neither where the file by itself is, nor with the forces beside it.
 
-    **Arguments:** `source`, the file; by joint the explanations, and the recordings (the first is
-    the one explained, the second held out); `name` of the file to be, for the module beside it;
-    `again`, what a closed loop needs to be run again.
+    **Arguments:** `source`, the file, or its text with springs in transmissions; by joint the
+    explanations, and the recordings (the first is the one explained, the second held out); `name`
+    of the file to be, for the module beside it; `again`, what a closed loop needs to be run again;
+    `given`, the file as it was, where `source` is a text with springs.
     """
+    files = Files(source, source if given is None else given)
     values: dict[str, tuple[float, float]] = {}
     left: list[str] = []
     for joint, told in reversed(found.items()):
-        attributes, more = _put_right(source, joint, told)
+        attributes, more = _put_right(files, joint, told)
         values |= attributes
         left += more
         for key, moved in _moved(told).items():
@@ -115,13 +119,16 @@ def patch(
     apart = _contradicted(found)
     left += [f"{_label(key)}: {why}" for key, why in apart.items()]
     values = {key: pair for key, pair in values.items() if key not in apart}
-    done = patched(library(), source, {key: to for key, (_, to) in values.items()})
-    done, models, unable, errors = _without_harm(source, done, values, found, recordings)
+    done = files.patched({key: to for key, (_, to) in values.items()})
+    done, models, unable, errors = _without_harm(files, done, values, found, recordings)
     left += unable
+    springs = new_springs(files.given, done.text)
     speeds = {joint: _speed(recordings[joint][0]) for joint in models}
     module = f"{Path(name).stem}_forces.py"
+    if why := [spring.why for spring in springs if spring.why]:
+        return _as_given(files, why, found, recordings, module)
     forces = callback.callback(models, speeds, module) if models else None
-    written = [
+    written = [spring.text for spring in springs] + [
         f"{_label(key)}: {values[key][0]:.5g} → {values[key][1]:.5g}" for key in done.written
     ]
     written += [
@@ -135,11 +142,29 @@ def patch(
         done.text, forces, written, left, errors, module, tuple(filter(None, misses)),
         as_read=tuple(filter(None, notes)),
     )  # fmt: skip
-    return patch if again is None else patch._replace(rerun=_again(source, patch, found, again))
+    return patch if again is None else patch._replace(rerun=_again(files, patch, found, again))
+
+
+class Files(NamedTuple):
+    """The model that is changed, a file or a text with springs, and the file as it was given."""
+
+    source: str | Path
+    given: str | Path
+
+    def patched(self, values: Mapping[str, float]) -> Patched:
+        """The model with other values."""
+        return patched(library(), self.source, values, folder_of(self.given))
+
+
+def _as_given(files: Files, why: list[str], found, recordings, module: str) -> Patch:
+    """The file as it was, where it does not take a spring: all else holds only beside that."""
+    text = text_of(library(), files.given)
+    errors = _read_again(files.given, text, found, recordings, {})
+    return Patch(text, None, [], why, errors, module)
 
 
 def _forces(
-    source, text: str, found: dict[str, Explanation], recordings
+    given, text: str, found: dict[str, Explanation], recordings
 ) -> tuple[dict[str, Model], list[str]]:
     """The forces beside the file by joint, and why others are not written, a line each."""
     models: dict[str, Model] = {}
@@ -151,7 +176,7 @@ def _forces(
             f"joint {joint}: {p.name}: it is no function of the joint's own position and speed"
             for p in others
         ]
-        good = _confirmed(source, text, joint, told, recordings[joint], model, able)
+        good = _confirmed(given, text, joint, told, recordings[joint], model, able)
         left += [f"joint {joint}: {p.name}: {WORSE}" for p in able if p not in good]
         if good:
             models[joint] = callback.only(model, good)
@@ -163,12 +188,12 @@ WORSE = "the held-out recording is worse with it"
 
 
 def _confirmed(
-    source, text: str, joint: str, told: Explanation, recordings, model, able: Sequence[Part]
+    given, text: str, joint: str, told: Explanation, recordings, model, able: Sequence[Part]
 ) -> list[Part]:
     """The forces of a joint beside the file that make its held-out recording no worse."""
     if model is None or len(recordings) < 2 or not able:
         return list(able)
-    both = readback.pair(source, text, joint, recordings, {})
+    both = readback.pair(given, text, joint, recordings, {})
 
     def error(some: Sequence[Part]) -> float:
         forces = callback.only(model, some) if some else None
@@ -181,13 +206,13 @@ def _confirmed(
 SHARED = ("body/", "option/")
 
 
-def _without_harm(source, done: Patched, values, found, recordings):
+def _without_harm(files: Files, done: Patched, values, found, recordings):
     """The file without values that make a joint worse than it was, first those of bodies, then the
     joint's own; the forces beside it by joint, and why others are not written; and the force
     errors of all joints by it.
     """
-    models, unable = _forces(source, done.text, found, recordings)
-    errors = _read_again(source, done.text, found, recordings, models)
+    models, unable = _forces(files.given, done.text, found, recordings)
+    errors = _read_again(files.given, done.text, found, recordings, models)
     for own in (False, True):
         joints = [joint for joint, each in errors.items() if worse(each)]
         mine = {key for joint in joints for key in _moved(found[joint])}
@@ -197,9 +222,9 @@ def _without_harm(source, done: Patched, values, found, recordings):
         said = [f"joint {joint} would be worse: {from_to(errors[joint])}" for joint in joints]
         kept = {key: values[key][1] for key in done.written if key not in harm}
         left = {**done.left, **dict.fromkeys(harm, "; ".join(said))}
-        done = patched(library(), source, kept)._replace(left=left)
-        models, unable = _forces(source, done.text, found, recordings)
-        errors = _read_again(source, done.text, found, recordings, models)
+        done = files.patched(kept)._replace(left=left)
+        models, unable = _forces(files.given, done.text, found, recordings)
+        errors = _read_again(files.given, done.text, found, recordings, models)
     return done, models, unable, errors
 
 
@@ -227,19 +252,19 @@ def _label(key: str) -> str:
     return f"{key} (its inertia in proportion)" if key.endswith(f"/{MASS}") else key
 
 
-def _read_again(source, text: str, found, recordings, models) -> dict[str, dict[str, Any]]:
+def _read_again(given, text: str, found, recordings, models) -> dict[str, dict[str, Any]]:
     """The force errors of all joints by the file as it was written, see `Patch.errors`."""
     errors: dict[str, dict[str, Any]] = {}
     shared: dict[bytes, Any] = {}
     for joint, told in found.items():
-        both = readback.pair(source, text, joint, recordings[joint], shared)
+        both = readback.pair(given, text, joint, recordings[joint], shared)
         errors[joint] = readback.errors(told, *both, recordings[joint], models.get(joint))
     return errors
 
 
-def _put_right(source, joint: str, told: Explanation):
+def _put_right(files: Files, joint: str, told: Explanation):
     """What was put right before any physics, and a dead time, as attributes; and what has none."""
-    model = Mujoco(source, joint)
+    model = Mujoco(files.source, joint, folder_of(files.given))
     values: dict[str, tuple[float, float]] = {}
     left: list[str] = []
     for finding in told.findings:
@@ -272,14 +297,15 @@ def _late(model: Mujoco, what: str, said: str, time, values, left: list[str]) ->
     values[own.path(what)] = before, before + float(time.value)
 
 
-def _again(source, patch: Patch, found: dict[str, Explanation], again: Again) -> Rerun:
+def _again(files: Files, patch: Patch, found: dict[str, Explanation], again: Again) -> Rerun:
     """Both models run again, the one after with what its file cannot hold beside it."""
     space: dict[str, Any] = {}
     if patch.forces is not None:
         exec(compile(patch.forces, patch.module, "exec"), space)
     return rerun(
-        source, patch.text, folder_of(source), again.simulators, again.logs, again.references,
-        {joint: _acting(told) for joint, told in found.items()}, space.get("FORCES", {}),
+        files.given, patch.text, folder_of(files.given), again.simulators, again.logs,
+        again.references, {joint: _acting(told) for joint, told in found.items()},
+        space.get("FORCES", {}),
     )  # fmt: skip
 
 

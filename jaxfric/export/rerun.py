@@ -96,7 +96,7 @@ def rerun(
     is `acting`, and the forces `beside` the model after.
     """
     some = next(iter(simulators.values()))
-    mujoco, names = some.mujoco, tuple(some.joints)
+    mujoco, names = some.mujoco, tuple(some.recorded)
     for joint in names:
         if joint not in references:
             return Rerun(NO_REFERENCE.format(joint=joint))
@@ -122,13 +122,13 @@ def rerun(
     return Rerun(
         "", names, log.time, log.reference, log.motion.position, first, second,
         SERVOS if law is None else f"{LAW}: {', '.join(law.parts)}",
-        tuple("rad" if is_hinge(mujoco, some.model, i) else "m" for i in range(len(names))),
+        tuple("rad" if is_hinge(mujoco, some.model, i) else "m" for i in _places(some)),
     )  # fmt: skip
 
 
 def _log(some: Mujoco, names: Sequence[str], logs, references) -> closed.Log:
     own = logs[some.joint]
-    motion: Motion = some.along(own).motion
+    motion = Motion(*(part[:, _places(some)] for part in some.along(own).motion))
     force = np.stack(
         [np.asarray(logs[n].channels.get(COMMAND, logs[n].force), float) for n in names], axis=1
     )
@@ -136,6 +136,11 @@ def _log(some: Mujoco, names: Sequence[str], logs, references) -> closed.Log:
     known = np.isfinite(force) & np.isfinite(reference)
     force, reference = (np.where(known, values, 0.0) for values in (force, reference))
     return closed.Log(np.asarray(own.time, float), motion, force, reference)
+
+
+def _places(some: Mujoco) -> list[int]:
+    """Where the joints that have an encoder are among all."""
+    return [some.joints.index(name) for name in some.recorded]
 
 
 def _commanded(

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from .elastic import springs_of
 from .inverse import Motion
 
 # What a law of control leaves of the command: more, and it is another one.
@@ -63,11 +64,18 @@ def bias(mujoco: Any, model: Any, motion: Motion) -> np.ndarray:
     return found
 
 
+def encoders(mujoco: Any, model: Any) -> list[int]:
+    """The numbers of the joints that have an encoder: all but springs of transmissions."""
+    springs = springs_of(mujoco, model)
+    return [joint for joint in range(model.nv) if joint not in springs]
+
+
 def _bias(mujoco: Any, model: Any, data: Any, position, velocity) -> np.ndarray:
-    data.qpos[:], data.qvel[:] = position, velocity
+    at = encoders(mujoco, model)
+    data.qpos[at], data.qvel[at] = position, velocity
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
-    return data.qfrc_bias.copy()
+    return data.qfrc_bias[at].copy()
 
 
 def law_of(mujoco: Any, model: Any, log: Log) -> Law:
@@ -115,7 +123,7 @@ def servos(mujoco: Any, model: Any) -> bool:
     joints = sorted(int(j) for j in model.actuator_trnid[:, 0])
     own = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_JOINT)
     pulls = np.isclose(model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 1])
-    able = model.nu == model.nv and joints == list(range(model.nv))
+    able = joints == encoders(mujoco, model)
     return bool(able and np.all(own) and np.all(pulls & (model.actuator_gainprm[:, 0] > 0)))
 
 
@@ -155,17 +163,17 @@ def run(
     if law is not None and not actuation.actuators:
         # The law's force is the joint's: what the model's actuators make of no command is not.
         model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = log.motion.position[0], log.motion.velocity[0]
-    _begin(data, model, log, law, actuation)
+    data, at = mujoco.MjData(model), encoders(mujoco, model)
+    data.qpos[at], data.qvel[at] = log.motion.position[0], log.motion.velocity[0]
+    _begin(data, model, log, law, actuation, at)
     found = np.full(log.motion.position.shape, np.nan)
     loop = _Loop(mujoco, model, log, law, actuation)
     most = LOST * np.ptp(log.motion.position, axis=0)
     for i, (start, span) in enumerate(
         zip(log.time, np.diff(log.time, append=log.time[-1]), strict=True)
     ):
-        found[i] = data.qpos
-        if not np.all(np.abs(data.qpos - log.motion.position[i]) <= most):
+        found[i] = data.qpos[at]
+        if not np.all(np.abs(data.qpos[at] - log.motion.position[i]) <= most):
             model.opt.timestep, model.opt.disableflags = kept, flags
             return None
         model.opt.timestep = max(span / steps, 1e-9)
@@ -173,17 +181,18 @@ def run(
             mujoco.mj_step1(model, data)
             loop.drive(data, float(start) + k * model.opt.timestep)
             for joint, force in (beside or {}).items():
-                data.qfrc_applied[joint] -= force(data.qpos[joint], data.qvel[joint], data.time)
+                own = at[joint]
+                data.qfrc_applied[own] -= force(data.qpos[own], data.qvel[own], data.time)
             mujoco.mj_step2(model, data)
     model.opt.timestep, model.opt.disableflags = kept, flags
     return found
 
 
-def _begin(data: Any, model: Any, log: Log, law: Law | None, actuation: Actuation) -> None:
-    """The actuators' filters where the recording begins."""
+def _begin(data: Any, model: Any, log: Log, law: Law | None, actuation: Actuation, places) -> None:
+    """The actuators' filters where the recording begins; `places` of the joints."""
     first = log.reference[0] if law is None else log.force[0]
     for i in range(model.nu):
-        at, joint = int(model.actuator_actadr[i]), int(model.actuator_trnid[i, 0])
+        at, joint = int(model.actuator_actadr[i]), places.index(int(model.actuator_trnid[i, 0]))
         if at >= 0 and (law is None or joint in actuation.actuators):
             data.act[at] = first[joint]
 
@@ -196,8 +205,10 @@ class _Loop:
         self.log, self.law, self.actuation = log, law, actuation
         goal = np.gradient(log.reference, log.time, axis=0)
         self.goals = [log.reference, goal, np.gradient(goal, log.time, axis=0)]
-        self.sum, self.before = np.zeros(model.nv), float(log.time[0])
-        self.joints = [int(j) for j in model.actuator_trnid[:, 0]] if law is None else []
+        self.at = encoders(mujoco, model)
+        self.sum, self.before = np.zeros(len(self.at)), float(log.time[0])
+        driven = [self.at.index(int(j)) for j in model.actuator_trnid[:, 0]]
+        self.joints = driven if law is None else []
         self.late: list[tuple[float, np.ndarray]] = []
         self.acting: np.ndarray | None = None
 
@@ -212,12 +223,12 @@ class _Loop:
             data.ctrl[:] = wanted[self.joints]
             data.qfrc_applied[:] = 0.0
             return
-        error, span = wanted - data.qpos, now - self.before
+        error, span = wanted - data.qpos[self.at], now - self.before
         self.sum += error * span
         self.before = now
         values = {
             "position error": error,
-            "velocity error": speed - data.qvel,
+            "velocity error": speed - data.qvel[self.at],
             "gravity and motion": self._weight(data),
             "constant": np.ones_like(error),
             "integral": self.sum,
@@ -227,14 +238,15 @@ class _Loop:
         acting = self._lagging(self._arriving(np.asarray(asked), now), span)
         for joint, number in self.actuation.actuators.items():
             data.ctrl[number], acting[joint] = acting[joint], 0.0
-        data.qfrc_applied[:] = acting
+        data.qfrc_applied[self.at] = acting
 
     def _weight(self, data: Any) -> np.ndarray:
         """Gravity and motion as the controller knows them; zero where it does not ask."""
         assert self.law is not None
         if "gravity and motion" not in self.law.parts:
-            return np.zeros_like(data.qpos)
-        return _bias(self.mujoco, self.law.model, self.known, data.qpos, data.qvel)
+            return np.zeros(len(self.at))
+        place, speed = data.qpos[self.at], data.qvel[self.at]
+        return _bias(self.mujoco, self.law.model, self.known, place, speed)
 
     def _lagging(self, arriving: np.ndarray, span: float) -> np.ndarray:
         lag = self.actuation.lag

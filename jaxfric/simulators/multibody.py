@@ -24,7 +24,7 @@ from ..terms import (
 )
 from ..terms.base import Sum
 from ..terms.effects.cross_axis import force_channels, neighbour_channel
-from . import actuation, columns, inverse
+from . import actuation, columns, elastic, inverse
 from .known import AbstractSimulator, Attribute, along
 from .loading import is_hinge, joints_of, library, read
 from .touching import alone, at_limit, touching
@@ -73,21 +73,23 @@ class Mujoco(AbstractSimulator):
         self._shared = {} if shared is None else shared
         self.model = read(self.mujoco, model, folder)
         self.joints = joints_of(self.mujoco, self.model)
+        self.recorded = elastic.logged(self.mujoco, self.model, self.joints)
         alone(self.mujoco, self.model)
         self.zeros = dict(zeros or {})
         shift = np.array([self.zeros.get(name, 0.0) for name in self.joints])
         self.model.qpos0[:] += shift
         self.model.qpos_spring[:] += shift
         self.model.jnt_range[:] += shift[:, None]
-        if joint is None and len(self.joints) > 1:
+        names = self.recorded
+        if joint is None and len(names) > 1:
             raise ValueError(
-                f"The model has {len(self.joints)} joints: {', '.join(self.joints)}. Say which one "
-                f"the recording is of: joint={self.joints[0]!r} (--joint {self.joints[0]})."
+                f"The model has {len(names)} joints: {', '.join(names)}. Say which one "
+                f"the recording is of: joint={names[0]!r} (--joint {names[0]})."
             )
-        joint = self.joints[0] if joint is None else joint
-        if joint not in self.joints:
+        joint = names[0] if joint is None else joint
+        if joint not in names:
             raise ValueError(
-                f"The model has no joint {joint!r}. Its joints are {', '.join(self.joints)}."
+                f"The model has no joint {joint!r}. Its joints are {', '.join(names)}."
             )
         self.joint, self.number = joint, self.joints.index(joint)
         self.settled = settled
@@ -146,6 +148,7 @@ class Mujoco(AbstractSimulator):
             found |= dict(zip(channels_of(number), parts, strict=True))
         found |= self._neighbours(seen)
         soft, gone = self._sticks(seen), self.limited(recording)
+        soft |= elastic.ringing(self.mujoco, self.model, recording)
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
         if (gone | soft).all():
@@ -160,11 +163,12 @@ class Mujoco(AbstractSimulator):
 
     def _neighbours(self, seen: inverse.Along) -> dict[str, np.ndarray]:
         """The velocities of the other joints that move, m/s or rad/s, and the forces that they
-        need, by channel.
+        need, by channel; springs of transmissions have none.
         """
-        moving = np.flatnonzero(np.ptp(seen.motion.velocity, axis=0) > 0)
         found = {}
-        for i in moving[moving != self.number].tolist():
+        for i in [self.joints.index(name) for name in self.recorded if name != self.joint]:
+            if np.ptp(seen.motion.velocity[:, i]) <= 0:
+                continue
             named = self.joints[i], "rad" if is_hinge(self.mujoco, self.model, i) else "m"
             found[neighbour_channel(*named)] = seen.motion.velocity[:, i]
             # A machine's dry friction is at its limit as soon as it slips, MuJoCo's a while later.
@@ -190,17 +194,30 @@ class Mujoco(AbstractSimulator):
         """What the model says of all joints along a recorded motion."""
         key = b"along" + self._key(recording)
         if key not in self._shared:
-            logs = [self._position(recording, name) for name in self.joints]
+            logs = [self._position(recording, name) for name in self.recorded]
             place = b"motion" + self._places(logs)
             if place not in self._shared:
                 parts = np.array([derived(log) for log in logs])
                 self._shared[place] = inverse.Motion(*np.moveaxis(parts, 0, -1))
-            self._shared[key] = inverse.along(self.mujoco, self.model, self._shared[place])
+            motion = self._with_springs(self._shared[place], recording)
+            self._shared[key] = inverse.along(self.mujoco, self.model, motion)
         return self._shared[key]
+
+    def _with_springs(self, motion: inverse.Motion, recording: Recording) -> inverse.Motion:
+        """The motion of all joints, those that are springs of a transmission too."""
+        if len(self.recorded) == len(self.joints):
+            return motion
+        at = [self.joints.index(name) for name in self.recorded]
+        parts = []
+        for part in motion:
+            whole = np.zeros((len(part), len(self.joints)))
+            whole[:, at] = part
+            parts.append(whole)
+        return elastic.deflected(self.mujoco, self.model, inverse.Motion(*parts), recording)
 
     def _key(self, recording: Recording) -> bytes:
         """What the force along a motion depends on."""
-        logs = [self._position(recording, name) for name in self.joints]
+        logs = [self._position(recording, name) for name in self.recorded]
         zeros = repr(sorted(self.zeros.items()))
         known = f"{self._source} {zeros} {self.actuator} {self.settled}"
         own = hashlib.sha256(known.encode()).digest()

@@ -32,7 +32,7 @@ def patched(
     by MuJoCo; what it does not take is not written. `folder`: in which a text's meshes lie.
     """
     folder = folder or folder_of(source)
-    text, model = _text(mujoco, source), read(mujoco, source, folder)
+    text, model = text_of(mujoco, source), read(mujoco, source, folder)
     written: list[str] = []
     left: dict[str, str] = {}
     for group in _groups(values):
@@ -47,20 +47,20 @@ def patched(
     return Patched(text, tuple(written), left)
 
 
-def with_inertial(mujoco: Any, source: str | Path) -> set[str]:
+def with_inertial(mujoco: Any, source: str | Path, folder: Path | None = None) -> set[str]:
     """The names of the bodies whose mass and inertia stand apart in the file, in an `inertial`; of
     others, which geoms weigh, the inertia goes along with the mass.
     """
-    tree = bodies(tags(_text(mujoco, source)))
-    model = read(mujoco, source)
+    tree = bodies(tags(text_of(mujoco, source)))
+    model = read(mujoco, source, folder)
     if len(tree.bodies) != model.nbody - 1:
         return set()
     every = enumerate(tree.children, 1)
     return {label(model, body) for body, children in every if children["inertial"]}
 
 
-def _text(mujoco: Any, source: str | Path) -> str:
-    """The model's MJCF; of a URDF that of MuJoCo's own translation."""
+def text_of(mujoco: Any, source: str | Path) -> str:
+    """The MJCF of a model's file or text; of a URDF that of MuJoCo's own translation."""
     text = str(source) if is_text(source) else Path(source).read_text(encoding="utf-8")
     if tags(text)[0].name == "mujoco":
         return text

@@ -89,14 +89,15 @@ def edited(
     changes: Mapping[int, Mapping[str, str | None]],
     new: Mapping[int, str],
     renamed: Mapping[int, str] = MappingProxyType({}),
+    after: Mapping[int, str] = MappingProxyType({}),
 ) -> str:
     """The text with attributes of some tags set (`None`: taken away) and lines after others.
 
     **Arguments:** `changes` by the number of the tag; `new`, an element to stand first in a tag;
-    `renamed`, another name of a tag that has no end tag.
+    `renamed`, another name of a tag that has no end tag; `after`, an element behind such a tag.
     """
     raw, found = text.encode(), tags(text)
-    for place in sorted({*changes, *new, *renamed}, key=lambda n: -found[n].start):
+    for place in sorted({*changes, *new, *renamed, *after}, key=lambda n: -found[n].start):
         start = found[place].start
         stop = _end(raw, start)
         tag = raw[start:stop].decode()
@@ -106,6 +107,12 @@ def edited(
             if not tag.endswith("/>"):
                 raise ValueError(f"its {found[place].name} has an end tag: write it as <… />")
             tag = f"<{renamed[place]}{tag[1 + len(found[place].name) :]}"
+        if place in after:
+            if not tag.endswith("/>"):
+                raise ValueError(f"its {found[place].name} has an end tag: write it as <… />")
+            line = raw.rfind(b"\n", 0, start) + 1
+            blank = raw[line:start].decode()
+            tag = f"{tag}\n{blank if not blank.strip() else ''}{after[place]}"
         if place in new:
             line = raw.rfind(b"\n", 0, start) + 1
             blank = raw[line:start].decode()

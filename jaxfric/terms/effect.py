@@ -18,6 +18,10 @@ FAMILIES = ("values", "friction", "position", "reversals", "actuator", "time", "
 # A recording of ones: names and dimensions of an effect's parameters do not depend on it.
 ANY = Scales(*[1.0] * len(Scales._fields))
 
+# A frequency times the half-width of the kernel (1 − τ²)⁴, where it passes nothing: the first zero
+# of J₄.₅(2πfh). Above it passes 1 % of a force at most.
+PASSED = 1.302
+
 
 class View(NamedTuple):
     """What the search for a term sees of a recording.

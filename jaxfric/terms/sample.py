@@ -67,7 +67,8 @@ class Burden(NamedTuple):
 
     `inertia`, kg, and `friction`, N, of which a machine has no more; `give`, m, by which a spring
     gives way under that friction; `curved`: whether the friction is a part of a Stribeck curve;
-    `lighter`: β with the inertia divided by a number, where the data tell it badly.
+    `lighter`: β with the inertia divided by a number, where the data tell it badly; `resonance`,
+    Hz, at which a load swings.
     """
 
     inertia: float
@@ -75,6 +76,7 @@ class Burden(NamedTuple):
     give: float = 0.0
     curved: bool = False
     lighter: Callable[[float], np.ndarray] | None = None
+    resonance: float = 0.0
 
 
 class Resolution(NamedTuple):

@@ -262,7 +262,7 @@ def _by_zero(parts: Sequence[Part], faults: Faults) -> dict[str, dict[str, Chang
             continue
         found[part.name] = {
             joint: _differences(simulator, part.recording, faults.zeros, joint)
-            for joint in simulator.joints
+            for joint in simulator.recorded
         }
     return found
 

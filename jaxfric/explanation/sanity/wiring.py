@@ -155,7 +155,9 @@ def _positions(parts: Sequence[Part], rows: Sequence[Rows]) -> dict[str, str]:
         if max(left) < RIGHT:
             tried[change] = float(np.mean(left))
     best = min(tried, key=lambda change: tried[change], default=None)
-    return _told(best, simulator.joints) if best is not None and tried[best] < 0.5 * before else {}
+    return (
+        _told(best, simulator.recorded) if best is not None and tried[best] < 0.5 * before else {}
+    )
 
 
 # What logs count positions in, in the model's unit.
@@ -164,7 +166,7 @@ LENGTHS = {"mm": 1e-3}
 
 
 def _changes(simulator: Mujoco) -> Iterator[Change]:
-    joints = simulator.joints
+    joints = simulator.recorded
     swaps: list[tuple[str, ...]] = [
         (one, two) for i, one in enumerate(joints) for two in joints[i + 1 :]
     ]
@@ -172,7 +174,8 @@ def _changes(simulator: Mujoco) -> Iterator[Change]:
     swaps += [tuple(joints)] if len(joints) > 2 else []
     yield from (Change((name,), -1.0) for name in joints)
     yield from (Change(names, forces=forces) for names in swaps for forces in (False, True))
-    hinges = [is_hinge(simulator.mujoco, simulator.model, i) for i in range(len(joints))]
+    numbers = [simulator.joints.index(name) for name in joints]
+    hinges = [is_hinge(simulator.mujoco, simulator.model, i) for i in numbers]
     for units, turns in ((ANGLES, True), (LENGTHS, False)):
         names = tuple(name for name, hinge in zip(joints, hinges, strict=True) if hinge == turns)
         # One of them alone, as the only one with another encoder; or the whole log.

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ...data.recording import Recording
 from ...units import DIMENSIONLESS, FORCE, FREQUENCY, INERTIA
 from ..base import AbstractTerm
-from ..effect import GRID, Effect, Extent, View, inside
+from ..effect import GRID, PASSED, Effect, Extent, View, inside
 from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
 from ..transmission import DECELERATION, AbstractDryLoad, DryLoad, load_motion
@@ -75,7 +75,8 @@ class Compliance(AbstractStates):
 
     def burden(self, beta, alpha) -> Burden:
         known = {p.name: float(a) for p, a in zip(self.affine, alpha, strict=True)}
-        return Burden(known.get("load_inertia", 0.0), known.get("load_friction", 0.0))
+        loads = (known.get(p.name, 0.0) for p in (_LOAD_INERTIA, _LOAD_FRICTION))
+        return Burden(*loads, resonance=float(beta[0]))
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
         return jnp.zeros((recording.num_samples, len(self.affine)), recording.time.dtype)
@@ -184,7 +185,7 @@ class DryCompliance(AbstractDryLoad):
     def burden(self, beta, alpha) -> Burden:
         resonance, _, slow = beta
         give = slow / (2 * np.pi * resonance) ** 2
-        return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give)
+        return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give, resonance=float(resonance))
 
     def columns_and_momentum(self, recording):
         held, speed = load_motion(recording, *self.load)
@@ -230,10 +231,10 @@ def coasting(view: View) -> np.ndarray:
 
 
 def resonances(term: AbstractTerm, view: View) -> np.ndarray:
-    """Frequencies up to what the nodes still resolve, with a few dampings each."""
+    """Frequencies up to what the kernel still passes, with a few dampings each."""
     count = len(term.nonlinear)
     low, most = inside(term, view.limits, np.array([[0.0] * count, [1.0] * count]))[:, 0]
-    high = max(min(most, 0.5 * view.nodes / view.reach), 2 * low)
+    high = max(min(most, PASSED / view.reach), 2 * low)
     swinging = [(f, z) for z in _DAMPING for f in np.geomspace(low, high, GRID)]
     if isinstance(term, DryCompliance):
         return np.array([(*place, d) for place in swinging for d in coasting(view)])
