@@ -658,6 +658,18 @@ def test_what_the_rows_show_and_no_sample_is_told_as_not_in_the_model():
     assert said.startswith(wording.SHAPED) and "held-out" not in said
     document = {"verdict": "unexplained", "not_confirmed": [gap._asdict()], "findings": []}
     assert any("Look at the machine for backlash" in step for step in advice.steps(document))
+    assert "with what accounts for it" in advice.headline(document)
     refuted = gap._replace(confirmed=False)
     said = wording.summary("unexplained", "gaussian", [], [gap, refuted], fit, [])
     assert said.startswith(wording.REFUTED)
+    document["not_confirmed"].append(refuted._asdict())
+    assert "in both recordings" in advice.headline(document)
+
+
+def test_a_law_that_is_looked_for_in_another_way_is_not_told_as_beside_the_rows(monkeypatch):
+    """A late force is dropped, and no form of a law with it."""
+    found = types.SimpleNamespace(selection=types.SimpleNamespace(forms=frozenset()))
+    monkeypatch.setattr(explaining, "searched", lambda *_: found)
+    monkeypatch.setattr(explaining, "_judged", lambda *_: (None, GAP))
+    _, better = explaining._found(None, None, None, None, 0, lambda _: None)
+    assert better.dropped == GAP.dropped and better.shown is None

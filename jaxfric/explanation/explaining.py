@@ -213,11 +213,10 @@ def _found(
             break
         refused |= gone
     first = rounds[0][1]
-    if len(rounds) == 1:
-        return wrong, better
-    if first.shown is not None and _stands_in(better, first):
-        return rounds[0]
-    better = _with_dropped(better, [each for _, each in rounds])
+    if len(rounds) > 1:
+        if _stands_in(better, first):
+            return rounds[0]
+        better = _with_dropped(better, [each for _, each in rounds])
     return wrong, better._replace(shown=None)
 
 
@@ -227,7 +226,7 @@ def _stands_in(better: Improved, first: Improved) -> bool:
     """
     if not first.seen or set(first.dropped) & set(better.findings.selection.names):
         return False
-    if not better.findings.selection.selected or first.spoilt is None:
+    if not better.findings.selection.selected or first.spoilt is None or first.shown is None:
         return False
 
     def evidence(errors: Errors) -> float:

@@ -36,7 +36,7 @@ def with_spring(
     if first.fit[names[-1]] and found.fit[names[-1]]:
         held = 1 - (found.fit[names[-1]]["before"] / first.fit[names[-1]]["before"]) ** 2
     finding = Finding(
-        COMPLIANCE.name, EQUATION, _sentence(spring), COMPLIANCE.confusable_with[:0],
+        COMPLIANCE.name, EQUATION, _sentence(spring), (),
         COMPLIANCE.separate_by, spring.estimates, max(1 - part, 0.0), held,
         p_value(spring.estimates[STIFFNESS]),
         attribute=f"joint/{spring.joint}{ENDING}/{STIFFNESS}",

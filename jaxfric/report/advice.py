@@ -44,15 +44,20 @@ def headline(document: Mapping[str, Any]) -> str:
         "explained": f"The model leaves out {shown}, which accounts for the mismatch{errors}.",
         "partly_explained": f"The model leaves out {shown}; that is a part of the mismatch, and "
         f"more is left{errors}.",
-        "unexplained": "Something is missing"
-        + (
-            ", and no effect accounts for it in both recordings"
-            * any(each["confirmed"] is False for each in document.get("not_confirmed") or ())
-            or " that no effect of the library accounts for"
-        )
+        "unexplained": f"Something is missing{_unaccounted(document)}"
         + (f", most of it over {where[0]}" if where else "")
         + f"{errors}.",
     }.get(document["verdict"], f"{spoken(document['verdict'])}{errors}.")
+
+
+def _unaccounted(document: Mapping[str, Any]) -> str:
+    """Why nothing accounts for what is missing."""
+    left_out = {each["confirmed"] for each in document.get("not_confirmed") or ()}
+    if False in left_out:
+        return ", and no effect accounts for it in both recordings"
+    if None in left_out:
+        return ", and the model is not better with what accounts for it"
+    return " that no effect of the library accounts for"
 
 
 def _compared(document: Mapping[str, Any]) -> bool:
