@@ -317,7 +317,7 @@ def test_spikes_are_no_overflow_however_many():
     at = np.random.default_rng(0).choice(np.arange(10, force.size - 10, 7), 25, replace=False)
     force[at] += 400.0
     (remark,) = checks.inspect(changed(sound, force=force))
-    assert remark.name == "force_spikes" and remark.text.startswith("25 lone samples")
+    assert remark.name == "force_spikes" and "lone samples (25 of them)" in remark.text
     # Both ways, of three samples each.
     for k, i in enumerate(at):
         force[i : i + 3] = 400.0 * (-1) ** k

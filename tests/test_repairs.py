@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from jaxfric import checks
 from jaxfric.data import io
 from jaxfric.data.cleaning import FILTERED_SEAM, MISSING_ROWS, UNEXPLAINED_JUMP, clean
 
@@ -352,3 +353,74 @@ def test_a_coarse_encoder_or_a_rest_holds_no_position():
         tidy = put_in_order(t, x)
         np.testing.assert_array_equal(tidy.signals["position"], x)
         assert not any("straight" in text for text in tidy.notes)
+
+
+# ---- lone samples ----
+
+
+@settings(max_examples=60)
+@given(
+    role=st.sampled_from(["force", "position", "velocity"]),
+    count=st.integers(1, 3),
+    start=st.integers(20, 3970),
+    size=st.floats(0.3, 50.0),
+    sign=st.sampled_from([1.0, -1.0]),
+    unit=st.sampled_from([1e-6, 1.0, 1e3]),
+)
+def test_lone_samples_that_nothing_made_are_masked(role, count, start, size, sign, unit):
+    """A misread encoder or a bit of the bus: far from the others, and back within three samples."""
+    t = np.arange(4000) / 1000
+    noise = 1e-5 * np.random.default_rng(3).normal(size=(3, t.size))
+    truth = {
+        "force": unit * (np.sign(np.cos(7 * t)) + np.cos(3 * t) + noise[0]),
+        "position": unit * (np.sin(7 * t) + noise[1]),
+        "velocity": unit * (7 * np.cos(7 * t) + noise[2]),
+    }
+    truth["time"] = t
+    spoilt = {name: values.copy() for name, values in truth.items()}
+    bad = slice(start, start + count)
+    far = size * np.ptp(truth[role]) if role == "position" else (20 + size) * np.ptp(truth[role])
+    spoilt[role][bad] += sign * far
+    tidy = clean(spoilt, None, np.arange(t.size) + 2, "log")
+    assert np.flatnonzero(~tidy.mask).tolist() == list(range(start, start + count))
+    (note,) = tidy.notes
+    assert f"with a {role} far from all others" in note and f"row {start + 2})" in note
+    off = np.max(np.abs(tidy.signals[role] - truth[role])[bad])
+    assert off < 0.05 * np.ptp(truth[role]) or role == "force"
+
+
+@pytest.mark.parametrize("kind", ["hit", "wrap", "seam", "lost rows", "push", "stairs"])
+def test_what_a_machine_does_is_no_lone_sample(kind):
+    """A blow that turns the velocity over, a step that stays, a push of four samples, a count."""
+    t = np.arange(4000) / 1000
+    x = np.sin(7 * t) + 1e-6 * np.random.default_rng(4).normal(size=t.size)
+    force, velocity = np.sign(np.cos(7 * t)), 7 * np.cos(7 * t)
+    if kind == "hit":
+        x[2000:] -= 9.0 * (t[2000:] - t[2000])
+        velocity[2000:] -= 9.0
+    elif kind == "wrap":
+        x = np.mod(3 * x, 2 * np.pi)
+    elif kind == "seam":  # at rest there, three counts of noise across it
+        x[2000:] = x[2000]
+        x[2500::700] += 1e-4
+        x = np.mod(x - x[2000] - 5e-5, 2.0)
+    elif kind == "lost rows":
+        x[2000:] += 0.4
+    elif kind == "push":
+        force[2000:2004] += 30.0
+    else:
+        x = np.round(x, 2)
+    assert "far from all others" not in " ".join(put_in_order(t, x, force, velocity).notes)
+
+
+def test_lone_samples_stay_on_request_and_are_said(tmp_path):
+    t = np.arange(4000) / 1000
+    force = 5 * np.sign(np.cos(7 * t)) + 0.01 * np.random.default_rng(5).normal(size=t.size)
+    force[700] = 1e6
+    path = write(tmp_path / "log.csv", time=t, position=np.sin(7 * t), force=force)
+    recording, notes = io.read_with_notes(path)
+    assert not recording.mask[700] and np.count_nonzero(~recording.mask) == 1
+    assert "1e+06" in notes[0] and not [r for r in checks.inspect(recording) if "lone" in r.text]
+    untouched = io.read(path, repair=False)
+    assert untouched.mask.all() and float(untouched.force[700]) == 1e6
+    assert "force_spikes" in [remark.name for remark in checks.inspect(untouched)]

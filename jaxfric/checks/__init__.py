@@ -18,7 +18,6 @@ from .kinds import (
     remarks as remarks,
 )
 from .lateness import Lateness as Lateness, lateness as lateness, looks as looks
-from .lone import LONE as LONE, lone as lone
 from .misfit import Misfit as Misfit, misfit as misfit
 from .recorded import recorded as recorded, recorded_rows as recorded_rows
 from .structure import hides as hides

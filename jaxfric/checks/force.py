@@ -4,9 +4,10 @@ import itertools
 
 import numpy as np
 
+from ..data.cleaning.lone import LONE, lone
 from ..data.recording import Recording
 from .clock import Clock
-from .lone import CYCLE, LONE, PIECE, SPAN, lone
+from .lengths import CYCLE, PIECE, SPAN
 
 # At the end of a clipped signal's range there are three times the samples of the band below it.
 PILED = 3.0

@@ -178,20 +178,20 @@ KINDS = (
     Kind(
         "force_spikes",
         False,
-        "{value:.0f} lone samples hold a force far beyond all others: made by the sensor or the "
-        "file. Empty these cells, which masks them.",
+        "The force of lone samples ({value:.0f} of them) is far beyond all others: made by the "
+        "sensor or the file. Empty these cells, which masks them.",
     ),
     Kind(
         "position_spikes",
         False,
-        "The position jumps to and fro at {value:.0f} samples, as no motion does. Empty these "
-        "cells, which masks them.",
+        "The position jumps to and fro at lone samples ({value:.0f} of them), as no motion does. "
+        "Empty these cells, which masks them.",
     ),
     Kind(
         "velocity_spikes",
         False,
-        "The velocity column jumps to and fro at {value:.0f} samples, as no motion does. Empty "
-        "these cells, which masks them, or leave the column out: --columns velocity= .",
+        "The velocity column jumps to and fro at lone samples ({value:.0f} of them), as no motion "
+        "does. Empty these cells, which masks them, or leave the column out: --columns velocity= .",
     ),
     Kind(
         "one_direction",

@@ -5,11 +5,12 @@ import dataclasses
 import numpy as np
 
 from .. import signals
+from ..data.cleaning.lone import LONE, lone
 from ..data.recording import Recording
 from ..signals.comparing import GAIN
 from ..signals.late_velocity import ALIKE, BLOCKS, FEWEST, SHARED
 from .clock import Clock
-from .lone import CYCLE, LONE, PIECE, SPAN, lone
+from .lengths import CYCLE, PIECE, SPAN
 
 # Increments are 30 times their noise, which so takes 0.1 % off the scale: this is twice that. And
 # three standard errors, which chance exceeds on some axes in a thousand.

@@ -11,7 +11,7 @@ from ..data.recording import Recording, row_of
 from .clock import Clock
 from .force import force_faults, same_as_motion
 from .kinds import none, places
-from .lone import PIECE
+from .lengths import PIECE
 from .motion import (
     clock_faults,
     coarse,

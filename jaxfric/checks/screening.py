@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..data.cleaning.lone import BEYOND, LONE, beyond_usual
 from .force import (
     ACROSS,
     CLIPPED,
@@ -23,7 +24,7 @@ from .force import (
     THINNED,
     gains,
 )
-from .lone import BEYOND, CYCLE, LONE, PIECE, SPAN, beyond_usual
+from .lengths import CYCLE, PIECE, SPAN
 from .motion import FASTEST, MOVING, ONE_SPEED, RARE
 
 # Numbers of the signals that are looked at together: 1 MB each.

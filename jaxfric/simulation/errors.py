@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from .. import checks, signals
+from .. import signals
+from ..data.cleaning.lone import far_forces
 from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
@@ -18,17 +19,14 @@ from .prediction import Prepared, forces, located, samples_of
 
 
 def outliers(recording: Recording) -> Bool[np.ndarray, " N"]:
-    """Samples whose force no actuator made, by [`lone`][jaxfric.checks], `(N,)`.
+    """Samples whose force no actuator made, `(N,)`.
 
     At most three in a row, far beyond all others: a fault of the sensor, the bus or the file. A
     push or an impact lasts, and stays.
     """
     force, valid = np.asarray(recording.force, float), np.asarray(recording.mask)
     valid = valid & np.isfinite(force)
-    found = np.zeros_like(valid)
-    if np.count_nonzero(valid) > 2 * checks.LONE:
-        found[valid] = checks.lone(some(force, valid))
-    return found
+    return far_forces(force, valid)
 
 
 def in_motion(

@@ -7,6 +7,7 @@ import numpy as np
 from . import clock
 from .filtered import filtered_seams
 from .held import between_updates, held_for
+from .lone import lone_samples
 from .missing import missing_rows
 from .pieces import borders, note, runs, some
 from .wraps import check_period, unwrap
@@ -36,7 +37,7 @@ def clean(
     period: float | None = None,
     repair: bool = True,
 ) -> Clean:
-    """Put a log in order: clock, interruptions, invalid samples, wrapped position.
+    """Put a log in order: clock, interruptions, invalid and lone samples, wrapped position.
 
     **Arguments:** `signals`, role to float64 array of shape `(N,)`, with `time` in s; `segment`,
     labels of any kind whose changes start a new segment, or `None`; `rows`, the rows of the
@@ -64,6 +65,7 @@ def clean(
     if period is not None and "position" in signals:
         check_period(signals["position"][mask], period, source)
     if repair:
+        mask = _without_lone(signals, mask, segment, rows, notes)
         told = len(notes)
         if period is None:
             segment = filtered_seams(signals, mask, segment, rows, notes)
@@ -125,6 +127,17 @@ def _mask(signals, segment, rows, notes, source) -> np.ndarray:
             f"{source}: {np.count_nonzero(mask)} valid samples are left after the clean-up; at "
             f"least {MIN_SAMPLES} are needed. {' '.join(notes)}".rstrip()
         )
+    return mask
+
+
+def _without_lone(signals, mask, segment, rows, notes) -> np.ndarray:
+    """The mask without samples that no motion or actuator made, which are filled."""
+    for role, lone in lone_samples(signals, mask, segment).items():
+        furthest = signals[role][lone][np.argmax(np.abs(signals[role][lone]))]
+        signals[role] = _filled(signals[role], lone, segment)
+        mask = mask & ~lone
+        what = f"with a {role} far from all others, as {furthest:.4g}, masked: of the sensor or bus"
+        note(notes, lone, rows, what)
     return mask
 
 
