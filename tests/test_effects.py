@@ -61,8 +61,8 @@ CASES = {
     "frictional_lag_2": (T.FrictionalLag(0.05, T.Exponential(0.05), 2), (4.0,)),
     "backlash": (T.Backlash(0.003), (3.0,)),
     "elastic_backlash": (T.ElasticBacklash(0.003, 0.001, 2.0), (3.0,)),
-    "damped_backlash": (T.DampedBacklash(0.003, 0.001, 2.0, 0.4), (3.0,)),
-    "compliance_dry": (T.DryCompliance(4.0, 0.2, 0.5), (2.0,)),
+    "damped_backlash": (T.DampedBacklash(0.003, 0.001, 2.0, 0.4, 0.3), (3.0,)),
+    "compliance_dry": (T.DryCompliance(4.0, 0.2, 0.5, -0.3), (2.0,)),
     "compliance": (T.Compliance(2.0, 0.1), (3.0,)),
     "compliance_friction": (T.Compliance(2.0, 0.1, "friction"), (1.5,)),
     "compliance_both": (T.Compliance(2.0, 0.1, "both"), (3.0, 1.5)),
@@ -427,14 +427,16 @@ def test_a_filtered_speed_does_not_vanish_at_a_reversal():
 
 # With little friction a load rattles in its gap without end, and no two solutions agree for long.
 @pytest.mark.slow
+@pytest.mark.parametrize("uneven", [0.0, 0.4])
 @pytest.mark.parametrize(("gap", "slow"), [(None, 0.6), (0.004, 3.0)])
-def test_a_load_with_dry_friction_moves_as_its_equation_says(gap, slow):
+def test_a_load_with_dry_friction_moves_as_its_equation_says(gap, slow, uneven):
     """The same, stepped twenty times as finely and explicitly."""
     run, omega, damping, fine = swung(), 40.0, 0.2, 20
     clock = np.arange(run.num_samples * fine) / (1000 * fine)
     place, speed = (np.interp(clock, run.time, x) for x in (run.position, run.velocity))
-    ahead = (gap or 0.0) + slow / omega**2
-    load_at, load, log = place[0] - np.sign(speed[0]) * ahead, speed[0], []
+    way = np.sign(speed[0])
+    ahead = (gap or 0.0) + slow * (1 + uneven * way) / omega**2
+    load_at, load, log = place[0] - way * ahead, speed[0], []
     for x, v in zip(place, speed, strict=True):
         apart = x - load_at
         over = np.sign(apart) * max(abs(apart) - (gap or 0.0), 0.0)
@@ -443,9 +445,10 @@ def test_a_load_with_dry_friction_moves_as_its_equation_says(gap, slow):
             push = 0.0
         free = load + push / (1000 * fine)
         log.append(load)
-        load = np.sign(free) * max(abs(free) - slow / (1000 * fine), 0.0)
+        dry = slow * (1 + uneven * np.sign(free))
+        load = np.sign(free) * max(abs(free) - dry / (1000 * fine), 0.0)
         load_at += load / (1000 * fine)
-    _, found = transmission.load_motion(run, omega, damping, slow, gap)
+    _, found = transmission.load_motion(run, omega, damping, slow, gap, asymmetry=uneven)
     wanted = np.array(log)[::fine]
     apart = np.asarray(found) - wanted
     assert np.sqrt(np.mean(apart**2)) < 0.005 * np.sqrt(np.mean(wanted**2))

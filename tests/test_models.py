@@ -214,3 +214,18 @@ def damaged(change):
 def test_a_damaged_document_is_refused_with_what_is_wrong(text, message):
     with pytest.raises(ValueError, match=message):
         models.load(text)
+
+
+def test_a_parameter_that_the_term_has_a_value_of_may_be_left_out():
+    """As in a document of an earlier version, whose loads had no asymmetry."""
+    sides = {f"{name}{sign}": 1.0 for sign in "+-" for name in ("coulomb", "viscous")}
+    load = {"load_inertia": 0.5, "load_resonance": 9.0, "damping_ratio": 0.1}
+    term = models.coulomb_viscous() + terms.DryCompliance()
+    values = {"inertia": 2.0} | sides | load | {"load_deceleration": 2.0}
+    model = models.from_parameters(term, values)
+    assert float(model.parameters["load_asymmetry"]) == 0.0
+    document = model.to_dict()
+    del document["parameters"]["load_asymmetry"]
+    assert float(models.Model.from_dict(document).parameters["load_asymmetry"]) == 0.0
+    with pytest.raises(ValueError, match="Missing parameter load_deceleration"):
+        models.from_parameters(term, {"inertia": 2.0} | sides | load)

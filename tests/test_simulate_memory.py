@@ -33,10 +33,10 @@ def loaded(by="inertia", **values):
     return axis(term, **{name: value for name, value in given.items() if name in names})
 
 
-def dry(load_resonance=25.0, damping_ratio=0.1, load_deceleration=3.0):
+def dry(load_resonance=25.0, damping_ratio=0.1, load_deceleration=3.0, **uneven):
     return axis(
         terms.DryCompliance(), load_inertia=2.0, load_resonance=load_resonance,
-        damping_ratio=damping_ratio, load_deceleration=load_deceleration,
+        damping_ratio=damping_ratio, load_deceleration=load_deceleration, **uneven,
     )  # fmt: skip
 
 
@@ -103,11 +103,13 @@ CASES = {
     "both, light": loaded("both", load_resonance=40.0, damping_ratio=0.02),
     "dry": dry(),
     "dry, stiff": dry(80.0, 0.05),
+    "dry, uneven": dry(load_asymmetry=-0.4),
     "gap": gap(),
     "gap, narrow": gap(15.0, 1e-4),
     "flanks": elastic(),
     "flanks, narrow": elastic(1e-4, 2e-5),
     "damped": elastic(viscous_speed=0.2),
+    "damped, uneven": elastic(viscous_speed=0.2, load_asymmetry=0.4),
     "dead time": lagging(0, 3e-3),
     "long dead time": lagging(0, 2e-2),
     "lag": lagging(1, 3e-3),
@@ -181,7 +183,7 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
     slow = p.get("load_deceleration", 0.0)
     slope_load = p["backlash_force"] / p["viscous_speed"] if "viscous_speed" in p else 0.0
     mass = p["backlash_force"] / slow if gap else p["load_inertia"]
-    dry = p.get("load_friction", mass * slow)
+    dry, uneven = p.get("load_friction", mass * slow), p.get("load_asymmetry", 0.0)
     omega = np.sqrt(slow / p["windup"]) if gap else 2 * np.pi * p["load_resonance"]
     damping = 0.2 if gap else p["damping_ratio"]
     force = np.asarray(clock.force)
@@ -194,9 +196,10 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
         spring = 0.0 if gap and spring * over <= 0 else spring
         way, way_load = np.tanh(v / 1e-5), np.tanh((v if follows else v_load) / 1e-5)
         s = "+" if v > 0 else "-"
-        own = (p[f"coulomb{s}"] - dry) * way + (p[f"viscous{s}"] - slope_load) * v
+        own = (p[f"coulomb{s}"] - dry) * way - dry * uneven * abs(way)
+        own += (p[f"viscous{s}"] - slope_load) * v
         held = force[min(int(time / STEP + 1e-9), force.size - 1)]
-        load = spring - dry * way_load - slope_load * v_load
+        load = spring - dry * (way_load + uneven * abs(way_load)) - slope_load * v_load
         return [v, (held - own - spring) / (p["inertia"] - mass), v_load, load / mass]
 
     time = np.asarray(clock.time)
@@ -205,7 +208,7 @@ def two_masses(model, clock, follows=False, half_gap=0.0):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", ["inertia", "both", "dry", "flanks", "damped"])
+@pytest.mark.parametrize("case", ["inertia", "both", "dry, uneven", "flanks", "damped, uneven"])
 def test_the_motion_is_that_of_two_masses_by_another_solver(case):
     model, clock = CASES[case], driven(0.0)
     clock = driven(40 * np.sin(4 * np.pi * np.asarray(clock.time)))

@@ -208,16 +208,25 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     return [c for c in found if not (set(map(type, leaves(c.term))) <= present)]
 
 
+# Of a force whose sign follows the weight and not the motion, friction says nothing.
+LOPSIDED = 0.5
+
+
 def view(evidence: Evidence) -> View:
     """What the grids of the candidates are made from."""
     velocity = np.asarray(evidence.motion.velocity)
     change = np.abs(np.diff(velocity[: evidence.nodes]))
+    ways = [evidence.target[side * velocity[evidence.centre] > 0] for side in (1, -1)]
+    forward, backward = (float(np.median(way)) if len(way) else 0.0 for way in ways)
+    apart = forward - backward
+    asymmetry = (forward + backward) / apart if evidence.both_ways and apart > 0 else 0.0
     return View(
         type(evidence.limits)(*map(np.asarray, evidence.limits)),
         evidence.reach,
         NODES,
         float(np.median(np.abs(velocity[evidence.centre]))),
         float(np.quantile(change, 0.98)) * NODES / evidence.reach,
+        float(np.clip(asymmetry, -LOPSIDED, LOPSIDED)),
     )
 
 

@@ -12,7 +12,7 @@ import jax
 import numpy as np
 
 from ..terms.base import AbstractTerm
-from ..terms.effect import scattered
+from ..terms.effect import inside, scattered
 from .burdens import largest
 from .candidates import Candidate, CandidateSet, coarse
 from .evidence import Evidence
@@ -139,17 +139,16 @@ def among_many(
     if best is None:
         wide, rounds = _wide(candidate, rows, current, field), range(ROUNDS)
         best = np.concatenate([starts, best_of(wide, 2 * BEST)])
-    values = [np.log(np.unique(each)) for each in candidate.betas.T]
-    step = np.array([np.max(np.diff(each), initial=0.0) for each in values])
-    scatter = 2 * scattered(AROUND, len(step)) - 1
+    scale = _Scale.of(term, seen)
+    scatter = (2 * scattered(AROUND, candidate.betas.shape[1]) - 1) * scale.steps(candidate.betas)
     for number in rounds:
-        spread = np.exp(scatter * step / 2**number)
-        best = best_of(np.concatenate([best, *(each * spread for each in best)]), BEST)
+        around = [scale.moved(each, scatter / 2**number) for each in best]
+        best = best_of(np.concatenate([best, *around]), BEST)
     far = [each for each in refined(best) if within(each)]
     found = min(far or [fit([term], rows.seen, [best[0]], 0, rows.basis)], key=less)
     part, enough = 1.0, (1 - BEYOND_CHANCE) * float(rows.left @ rows.left)
     for _ in range(ALONG if found.energy < enough else 0):
-        [again] = refined(best_of(_along(found, AROUND, part), 1))
+        [again] = refined(best_of(_along(found, scale, AROUND, part), 1))
         better = less(again) < less(found)
         found, part = (again, part) if better else (found, part / 2)
     kept[here] = np.concatenate([found.betas[0][None], best])[:BEST]
@@ -159,15 +158,47 @@ def among_many(
     return found if found.energy <= (1 - BEYOND_CHANCE) * current.energy else of_all(near)
 
 
-def _along(found: Fit, count: int, part: float) -> np.ndarray:
+class _Scale(NamedTuple):
+    """What β is moved by: a factor of e, or of a parameter that is no ratio an eighth of its set.
+
+    `ratio`, `(d,)`, which are ratios; `unit`, `(d,)`, of the others.
+    """
+
+    ratio: np.ndarray
+    unit: np.ndarray
+
+    @classmethod
+    def of(cls, term: AbstractTerm, rows: Evidence) -> "_Scale":
+        low, high = inside(term, rows.limits, np.outer([0.0, 1.0], np.ones(len(term.nonlinear))))
+        return cls(np.array([p.logarithmic for p in term.nonlinear], bool), (high - low) / 8)
+
+    def steps(self, grid: np.ndarray) -> np.ndarray:
+        """The widest step of a grid, `(d,)`; one where it has one value."""
+        found = []
+        for values, ratio, unit in zip(grid.T, self.ratio, self.unit, strict=True):
+            each = np.unique(values)
+            gaps = np.diff(np.log(each)) if ratio else np.diff(each) / unit
+            found.append(np.max(gaps, initial=0.0) or 1.0)
+        return np.array(found)
+
+    def moved(self, beta: np.ndarray, by: np.ndarray) -> np.ndarray:
+        """β moved by so many of these, `(count, d)`."""
+        return np.where(self.ratio, beta * np.exp(by * self.ratio), beta + by * self.unit)
+
+    def rates(self, beta: np.ndarray) -> np.ndarray:
+        """How fast β changes, `(d,)`."""
+        return np.where(self.ratio, beta, self.unit)
+
+
+def _along(found: Fit, scale: _Scale, count: int, part: float) -> np.ndarray:
     """β scattered along the valley of a fit's energy, `(count, d)`: by a part of the way over which
     the energy would double, were it a parabola.
     """
     beta = found.betas[0]
     basis = orthonormal(found.columns)
-    slopes = found.slopes * beta
+    slopes = found.slopes * scale.rates(beta)
     slopes = slopes - basis @ (basis.T @ slopes)
     values, ways = np.linalg.eigh(slopes.T @ slopes)
     # No further than the parameter itself.
     reach = np.sqrt(found.energy / np.maximum(values, found.energy))
-    return beta * np.exp((2 * scattered(count, len(beta)) - 1) * part * reach @ ways.T)
+    return scale.moved(beta, (2 * scattered(count, len(beta)) - 1) * part * reach @ ways.T)

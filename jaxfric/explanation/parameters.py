@@ -70,7 +70,8 @@ def may_be_none(
 
     `other`: the same by other rows, of another recording or through a kernel of twice the width,
     which have to agree with it, as those that see little of it do, or to leave out zero on the same
-    side. `as_told`: by the intervals that are told instead of those of [`tested`][].
+    side. They contradict each other by the intervals that are told, of few blocks by few degrees of
+    freedom. `as_told`: zero, too, by these instead of those of [`tested`][].
     """
 
     def sure(name: str) -> bool:
@@ -78,11 +79,9 @@ def may_be_none(
         if low * high <= 0 or other is None:
             return bool(low * high > 0)
         least, most = tested(other[name]).interval()
-        apart = float(own[name].value) - float(other[name].value)
-        return bool(
-            abs(apart) <= np.hypot(high - low, most - least) / 2
-            or (least > 0 if low > 0 else most < 0)
-        )
+        apart = abs(float(own[name].value) - float(other[name].value))
+        within = np.hypot(*(float(each[name].half_width()) for each in (own, other)))
+        return bool(apart <= within or (least > 0 if low > 0 else most < 0))
 
     names = [name for name in own if name.startswith("amplitude")]
     return not any(sure(name) for name in (*names, *(p.name for p in term.affine)))

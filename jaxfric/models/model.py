@@ -262,12 +262,17 @@ def _slip_friction(model: Model, velocity: Float[Array, "*shape"]) -> Float[Arra
 def from_parameters(
     term: AbstractTerm, values: Mapping[str, float], units: Mapping[str, str] | None = None
 ) -> Model:
-    """A model from a sum of terms and the value of every parameter by name.
+    """A model from a sum of terms and the value of every parameter by name; a nonlinear one that
+    the term has a value of may be left out.
 
     **Raises:** `ValueError` if a parameter is missing or unknown.
     """
     names = [p.name for p in (*term.affine, *term.nonlinear)]
     missing = [name for name in names if name not in values]
+    if missing:
+        own = dict(zip(names[len(term.affine) :], np.asarray(term.beta()), strict=True))
+        known = {name: own[name] for name in missing if np.isfinite(own.get(name, np.nan))}
+        missing, values = [name for name in missing if name not in known], {**known, **values}
     if missing:
         raise ValueError(f"Missing parameter {listed(missing)}; the model needs {listed(names)}.")
     empty = Model(term, jnp.zeros(len(term.affine)), tuple((units or {}).items()))

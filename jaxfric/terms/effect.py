@@ -27,7 +27,9 @@ class View(NamedTuple):
     """What the search for a term sees of a recording.
 
     `limits`: its scales, as floats; `reach`: the kernel's half-width, s, of `nodes` local means;
-    `speed`: the median in slip, m/s; `acceleration`: 98 % of those at the nodes are below it, m/s².
+    `speed`: the median in slip, m/s; `acceleration`: 98 % of those at the nodes are below it, m/s²;
+    `asymmetry`: the force forwards and that backwards, their sum by their difference, zero where
+    the axis goes one way.
     """
 
     limits: Scales
@@ -35,6 +37,7 @@ class View(NamedTuple):
     nodes: int
     speed: float
     acceleration: float
+    asymmetry: float = 0.0
 
 
 class Waves(NamedTuple):

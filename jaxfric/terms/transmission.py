@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from ..units import ACCELERATION
+from ..units import ACCELERATION, DIMENSIONLESS
 from .presliding import AbstractStates, Instant, States, starts
 from .sample import Parameter, Resolution
 
@@ -23,18 +23,34 @@ OCTAVES = Resolution(0, 1, None, 12)
 DECELERATION = Parameter("load_deceleration", ACCELERATION, _coasting, resolution=OCTAVES)
 
 
+def _sided(scales):
+    """Up to nine times as much one way; at one, a load that nothing touches would not stay."""
+    return -0.8, 0.8
+
+
+# Of friction that differs by direction a twentieth decides when a load strikes.
+ASYMMETRY = Parameter(
+    "load_asymmetry", DIMENSIONLESS, _sided, logarithmic=False, resolution=Resolution(1, 1, None, 3)
+)
+
+
 class _Flank(NamedTuple):
     """A load on a spring and a damper: dw/dt = p − d sign(w) − κ w, p = ω² o + 2ζω do/dt.
 
-    `omega` ω, 1/s; `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. All within a step is along
-    the way in which the spring is wound up by o, m. With ζ < 1 the load swings in touch, however
-    large its viscous friction.
+    `omega` ω, 1/s; `damping` ζ; `forward` and `backward`, d where w > 0 and where w < 0, m/s²;
+    `decay` κ, 1/s. All within a step is along the way in which the spring is wound up by o, m.
+    With ζ < 1 the load swings in touch, however large its viscous friction.
     """
 
     omega: Float[Array, ""]
     damping: Float[Array, ""] | float
-    deceleration: Float[Array, ""]
+    forward: Float[Array, ""]
+    backward: Float[Array, ""]
     decay: Float[Array, ""] | float
+
+    def dry(self, side):
+        """d, m/s², of a load that goes or is pushed to a side."""
+        return jnp.where(side < 0, self.backward, self.forward)
 
     def push(self, over, slip):
         """p, m/s², where the motor is faster by `slip`, m/s."""
@@ -69,16 +85,16 @@ class _Flank(NamedTuple):
         sine = jnp.where(square > 0, fade * jnp.sin(own * time), 0.5 * (slow - fast))
         return cosine, sine / own
 
-    def touching(self, over, load, motor, gain, side, time, swing):
+    def touching(self, over, load, motor, gain, side, dry, time, swing):
         """What o and w are after a time in touch, and the impulse of p, m/s.
 
         `motor`, m/s, and `gain`, m/s², its speed and acceleration; `side`, that of the friction, 0
-        of a load that sticks; `swing`, of that time.
+        of a load that sticks; `dry`, d; `swing`, of that time.
         """
         cosine, sine = swing
         rate, slip = self.rate, motor - load
         mean = motor + 0.5 * gain * time
-        steady = gain + self.deceleration * side + self.viscous * mean
+        steady = gain + dry * side + self.viscous * mean
         from_rest = over - steady / self.omega**2
         change = from_rest * (cosine + rate * sine - 1) + slip * sine
         slips = slip * (cosine - rate * sine) - self.omega**2 * sine * from_rest
@@ -95,7 +111,7 @@ class _Flank(NamedTuple):
     def flying(self, ahead, load, motor, gain, time):
         """By how much the motor is ahead, and w, after a time without touch."""
         speed = jnp.abs(load)
-        slowed = self.deceleration + 0.5 * self.decay * speed
+        slowed = self.dry(load) + 0.5 * self.decay * speed
         after = jnp.maximum(speed - time * slowed, 0.0) / (1 + 0.5 * self.decay * time)
         after = jnp.sign(load) * after
         way = 0.5 * (load + after) * jnp.minimum(time, speed / slowed)
@@ -106,9 +122,11 @@ def _swung(flank: _Flank, state, motor, gain, span, swing):
     """One step of a load on a spring that pushes and pulls."""
     ahead, load = state
     push = flank.push(ahead, motor - load)
-    breaks = jnp.where(jnp.abs(push) > flank.deceleration, jnp.sign(push), 0.0)
+    breaks = jnp.where(jnp.abs(push) > flank.dry(push), jnp.sign(push), 0.0)
     side = jnp.where(load == 0, breaks, jnp.sign(load))
-    ahead, load, impulse = flank.touching(ahead, load, motor, gain, side, span, swing)
+    ahead, load, impulse = flank.touching(
+        ahead, load, motor, gain, side, flank.dry(side), span, swing
+    )
     return (ahead, load), impulse
 
 
@@ -124,10 +142,10 @@ def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
     over = jnp.abs(ahead) - half_gap
     push = flank.push(over, place * (motor - load))
     touches = (over >= 0) & (push >= 0)
-    breaks = jnp.where(touches & (push > flank.deceleration), place, 0.0)
+    breaks = jnp.where(touches & (push > flank.dry(place)), place, 0.0)
     side = jnp.where(load == 0, breaks, jnp.sign(load))
     # In touch throughout: when it would pull.
-    along = place * load, place * motor, place * gain, place * side
+    along = place * load, place * motor, place * gain, place * side, flank.dry(side)
     last, speed, _ = flank.touching(over, *along, span, swing)
     pulls = flank.push(last, place * (motor + gain * span) - speed)
     leaves = touches & (pulls < 0) & (side != 0)
@@ -150,7 +168,7 @@ def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
     now = motor + gain * before
     slips = jnp.where(load == 0, facing, jnp.sign(load))
     side = jnp.where(touches, side, slips)
-    along = facing * load, facing * now, facing * gain, facing * side
+    along = facing * load, facing * now, facing * gain, facing * side, flank.dry(side)
     over = facing * ahead - half_gap
     over, speed, impulse = flank.touching(over, *along, time, flank.swing(time))
     met = touches | strikes
@@ -171,6 +189,7 @@ def load_motion(
     deceleration: Float[Array, ""],
     half_gap: Float[Array, ""] | float | None = None,
     decay: Float[Array, ""] | float = 0.0,
+    asymmetry: Float[Array, ""] | float = 0.0,
 ) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
     """What a load's friction takes of its push, per mass, f, m/s², and its speed w, m/s, `(N,)`.
 
@@ -178,9 +197,10 @@ def load_motion(
     strikes the load is in w, and is smoothed as the motor's own speed is. Without `half_gap`
     p = ω² s + 2ζω ds/dt, s, m, the way by which the motor, at the recording's position, is ahead;
     with it, δ, the spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s;
-    `damping` ζ; `deceleration` d, m/s²; `decay` κ, 1/s. The motor's speed is straight between the
-    samples; touch and flight are solved exactly, to where the one ends and the other begins, once
-    between two samples, for any stiffness. A segment starts in slip.
+    `damping` ζ; `deceleration` d, m/s², of which there is 1 + `asymmetry` forwards and 1 − that
+    backwards; `decay` κ, 1/s. The motor's speed is straight between the samples; touch and flight
+    are solved exactly, to where the one ends and the other begins, once between two samples, for
+    any stiffness. A segment starts in slip.
     """
     begins, speed = starts(recording), recording.velocity
     span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0)))
@@ -190,9 +210,10 @@ def load_motion(
     gain = jnp.where(span > 0, (speed - last) / real, 0.0)
     # So that the motor goes the way that its position says.
     first = jnp.where(span > 0, way / real - 0.5 * gain * span, speed)
-    flank = _Flank(omega, damping, deceleration, decay)
+    sides = deceleration * (1 + asymmetry), deceleration * (1 - asymmetry)
+    flank = _Flank(omega, damping, *sides, decay)
     gap = 0.0 if half_gap is None else half_gap
-    dtype = jnp.result_type(omega, deceleration, gap)
+    dtype = jnp.result_type(omega, *sides, gap)
     span, first, gain, speed = (each.astype(dtype) for each in (span, first, gain, speed))
 
     def step(state, now):
@@ -204,7 +225,7 @@ def load_motion(
         else:
             (ahead, load), impulse = _struck(flank, half_gap, state, *motion)
         side = jnp.sign(speed)
-        slips = side * deceleration + decay * speed
+        slips = side * flank.dry(side) + decay * speed
         wound = side * gap + slips / omega**2
         state = jnp.where(begin, wound, ahead), jnp.where(begin, speed, load)
         held = (impulse - (load - before)) / jnp.where(span > 0, span, 1.0)
@@ -229,12 +250,17 @@ class DryLoad(NamedTuple):
     deceleration: Float[Array, ""]
     half_gap: Float[Array, ""] | float | None = None
     decay: Float[Array, ""] | float = 0.0
+    asymmetry: Float[Array, ""] | float = 0.0
+
+    def dry(self, side):
+        """What slows a load that goes or is pushed to a side, by dry friction, signed, m/s²."""
+        return (jnp.sign(side) + self.asymmetry * jnp.abs(jnp.sign(side))) * self.deceleration
 
     def start(self, velocity: Float[Array, ""]) -> States:
         """In slip, wound up by the load's friction."""
         side = jnp.sign(velocity)
         gap = 0.0 if self.half_gap is None else self.half_gap
-        slips = side * self.deceleration + self.decay * velocity
+        slips = self.dry(side) + self.decay * velocity
         wound = side * gap + slips / self.omega**2
         return States(jnp.stack([wound, velocity]), jnp.stack([side, side]))
 
@@ -252,7 +278,7 @@ class DryLoad(NamedTuple):
         """The derivative of `flow`."""
         side = states.kept[0]
         load = states.flow[1]
-        slowed = self.push(states, now.velocity) - self.deceleration * side - self.decay * load
+        slowed = self.push(states, now.velocity) - self.dry(side) - self.decay * load
         slip = now.velocity - load
         return jnp.stack([slip, jnp.where(side == 0, 0.0, slowed)])
 
@@ -264,7 +290,7 @@ class DryLoad(NamedTuple):
             flank = jnp.where(jnp.abs(ahead) >= self.half_gap, jnp.sign(ahead), 0.0)
         at = States(states.flow, jnp.stack([flank, flank]))
         push = self.push(at, now.velocity)
-        breaks = jnp.where(jnp.abs(push) > self.deceleration, jnp.sign(push), 0.0)
+        breaks = jnp.where(jnp.abs(push) > jnp.abs(self.dry(push)), jnp.sign(push), 0.0)
         side = jnp.where(load == 0, breaks, jnp.sign(load))
         return States(states.flow, jnp.stack([side, flank]))
 

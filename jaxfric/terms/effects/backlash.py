@@ -13,7 +13,14 @@ from ..base import AbstractTerm
 from ..effect import Effect, View, even, inside, product, scattered, with_parameter
 from ..presliding import AbstractStates, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, OCTAVES, AbstractDryLoad, DryLoad, load_motion
+from ..transmission import (
+    ASYMMETRY,
+    DECELERATION,
+    OCTAVES,
+    AbstractDryLoad,
+    DryLoad,
+    load_motion,
+)
 from .compliance import coasting
 
 
@@ -133,9 +140,8 @@ class ElasticBacklash(AbstractDryLoad):
     def columns_and_momentum(self, recording):
         held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
-        plain = held / self.load_deceleration - jnp.sign(motor)
-        plain -= self.decay / self.load_deceleration * motor
-        return plain[:, None], (speed - motor)[:, None] / self.load_deceleration
+        plain = held - self.load.dry(motor) - self.decay * motor
+        return tuple(x[:, None] / self.load_deceleration for x in (plain, speed - motor))
 
     @property
     def load(self) -> DryLoad:
@@ -163,7 +169,8 @@ class ElasticBacklash(AbstractDryLoad):
         return jnp.sqrt(self.load_deceleration / self.windup)
 
     def present(self, states, now):
-        return (self.load.push(states, now.velocity) / self.load_deceleration - now.side)[None]
+        push = self.load.push(states, now.velocity) - self.load.dry(now.side)
+        return (push / self.load_deceleration)[None]
 
 
 def _speed_bounds(scales):
@@ -174,21 +181,36 @@ def _speed_bounds(scales):
 
 
 class DampedBacklash(ElasticBacklash):
-    """[`ElasticBacklash`][] with a load that has viscous friction too, F_L (sign w + w/v_s).
+    """[`ElasticBacklash`][] with a load that has viscous friction too, F_L (sign w + α + w/v_s).
 
     `viscous_speed` v_s, m/s: there it is as large as the dry friction F_L. So a load that flies
-    through the gap is slowed by (1 + w/v_s) d.
+    through the gap is slowed by (1 ± α + w/v_s) d. `load_asymmetry` α: by how much of its mean
+    dry friction is more forwards and less backwards, as of a load with a weight, which alone
+    decides when it leaves a flank and strikes the other one.
     """
 
     viscous_speed: Float[Array, ""] | float = UNKNOWN
+    load_asymmetry: Float[Array, ""] | float = 0.0
     nonlinear: ClassVar = (
         *ElasticBacklash.nonlinear,
         Parameter("viscous_speed", VELOCITY, _speed_bounds, resolution=Resolution(0, 0.5, None, 4)),
+        ASYMMETRY,
     )
 
     def burden(self, beta, alpha) -> Burden:
         burden = super().burden(beta[:3], alpha)
-        return burden._replace(lighter=lambda factor: beta * np.array([1.0, 1.0, factor, 1.0]))
+        factors = (1.0, 1.0, np.nan, 1.0, 1.0)
+        return burden._replace(
+            lighter=lambda factor: beta * np.where(np.isnan(factors), factor, factors)
+        )
+
+    @property
+    def load(self) -> DryLoad:
+        return super().load._replace(asymmetry=self.load_asymmetry)
+
+    @property
+    def relief(self):
+        return (1 + abs(self.load_asymmetry),)
 
     def present(self, states, now):
         return super().present(states, now) - now.velocity / self.viscous_speed
@@ -202,14 +224,14 @@ def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     """Gaps and windups from what is crossed in a twentieth of the kernel's reach to the widest."""
     if not isinstance(term, ElasticBacklash):
         return even(term, view)
-    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4))))
+    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5))))
     least = 0.25 * view.acceleration * (view.reach / 20) ** 2
     least = np.clip(least, low[0], 0.1 * high[0])
     # A stiff flank is soon passed, whatever its stiffness; a load's viscous friction at full speed
     # is mostly as large as its dry one, or of no account.
     widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
     speeds = view.limits.fastest * np.array([1.0, 5.0])
-    return product([widths, windups, coasting(view), speeds])
+    return product([widths, windups, coasting(view), speeds, np.array([view.asymmetry])])
 
 
 def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
@@ -222,8 +244,8 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     """
     if not isinstance(term, ElasticBacklash):
         return np.zeros((0, len(term.nonlinear)))
-    place = scattered(count, 4)
-    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4))))
+    place = scattered(count, 5)
+    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5))))
     least = np.clip(0.25 * view.acceleration * (view.reach / 20) ** 2, low[0], 0.1 * high[0])
     stroke = view.limits.high - view.limits.low
     widest = np.maximum(stroke / 30, 2 * least)
@@ -232,8 +254,9 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     slowed = view.acceleration * 0.05 * 60.0 ** place[:, 2]  # at half the full speed
     ratio = 0.05 * 30.0 ** place[:, 3]  # viscous friction by dry friction there
     speed = 0.5 * view.limits.fastest / ratio
-    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed], axis=1)
-    ends = inside(term, view.limits, np.outer([0.0, 1.0], np.ones(4)))
+    asymmetry = 2 * view.asymmetry * place[:, 4]  # the motor has none, or the load all of it
+    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, asymmetry], axis=1)
+    ends = inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5)))
     return np.clip(found, *ends)
 
 

@@ -15,7 +15,7 @@ from ..base import AbstractTerm
 from ..effect import GRID, PASSED, Effect, Extent, View, inside
 from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
-from ..transmission import DECELERATION, AbstractDryLoad, DryLoad, load_motion
+from ..transmission import ASYMMETRY, DECELERATION, AbstractDryLoad, DryLoad, load_motion
 
 
 def _resonance_bounds(scales):
@@ -169,32 +169,36 @@ class DryCompliance(AbstractDryLoad):
 
     M_L p is what the spring pushes the load by (`load_motion`): [`Compliance`][] for a load whose
     friction lets it stick, M_L d of it. `load_inertia` M_L, kg; `load_resonance` ω/2π, Hz;
-    `damping_ratio` ζ; `load_deceleration` d, m/s².
+    `damping_ratio` ζ; `load_deceleration` d, m/s², by 1 + `load_asymmetry` of it forwards and by
+    1 − that backwards.
     """
 
     load_resonance: Float[Array, ""] | float = UNKNOWN
     damping_ratio: Float[Array, ""] | float = UNKNOWN
     load_deceleration: Float[Array, ""] | float = UNKNOWN
+    load_asymmetry: Float[Array, ""] | float = 0.0
     affine: ClassVar = (_LOAD_INERTIA,)
     nonlinear: ClassVar = (
         Parameter("load_resonance", FREQUENCY, _resonance_bounds, resolution=_DRY),
         *Compliance.nonlinear[1:],
         DECELERATION,
+        ASYMMETRY,
     )
 
     def burden(self, beta, alpha) -> Burden:
-        resonance, _, slow = beta
+        resonance, _, slow, _ = beta
         give = slow / (2 * np.pi * resonance) ** 2
         return Burden(float(alpha[0]), float(alpha[0] * beta[2]), give, resonance=float(resonance))
 
     def columns_and_momentum(self, recording):
         held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
-        return (held - self.load_deceleration * jnp.sign(motor))[:, None], (speed - motor)[:, None]
+        return (held - self.load.dry(motor))[:, None], (speed - motor)[:, None]
 
     @property
     def load(self) -> DryLoad:
-        return DryLoad(self.pace, self.damping_ratio, self.load_deceleration)
+        load = DryLoad(self.pace, self.damping_ratio, self.load_deceleration)
+        return load._replace(asymmetry=self.load_asymmetry)
 
     @property
     def shed(self):
@@ -202,7 +206,7 @@ class DryCompliance(AbstractDryLoad):
 
     @property
     def relief(self):
-        return (self.load_deceleration,)
+        return (self.load_deceleration * (1 + abs(self.load_asymmetry)),)
 
     @property
     def stiffness(self):
@@ -214,7 +218,7 @@ class DryCompliance(AbstractDryLoad):
 
     def present(self, states, now):
         push = self.load.push(states, now.velocity)
-        return (push - self.load_deceleration * now.side)[None]
+        return (push - self.load.dry(now.side))[None]
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
@@ -237,7 +241,7 @@ def resonances(term: AbstractTerm, view: View) -> np.ndarray:
     high = max(min(most, PASSED / view.reach), 2 * low)
     swinging = [(f, z) for z in _DAMPING for f in np.geomspace(low, high, GRID)]
     if isinstance(term, DryCompliance):
-        return np.array([(*place, d) for place in swinging for d in coasting(view)])
+        return np.array([(*p, d, view.asymmetry) for p in swinging for d in coasting(view)])
     return np.array(swinging)
 
 
