@@ -123,6 +123,16 @@ def test_the_flanks_of_a_gap_give_way_by_less_than_it():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("definition", ["two_mass", "dry_load", "free_load"])
+def test_the_load_behind_a_gap_has_the_force_and_windup_that_are_told(definition):
+    machine = concealed.draw(64, ("backlash",), definitions={"backlash": definition})
+    truth = machine.truth["backlash"]
+    force = machine.physics["load_friction_share"] * machine.coulomb
+    assert truth["backlash_force"] == pytest.approx(force)
+    assert truth["windup"] == pytest.approx(force / machine.physics["stiffness"])
+
+
+@pytest.mark.slow
 def test_a_stop_is_where_the_axis_comes_to_it():
     """This one stays so far behind its set-point that a stop by the set-point is never reached."""
     (seed,) = (c.seed for c in planning.plan(360, 20261129, (0.02, 0.3)) if c.name == "00044")

@@ -12,7 +12,7 @@ from . import parameters as spelled, verification
 from .baseline import refitted
 from .evidence import Evidence
 from .findings import Findings
-from .regression import Fit, at_shapes, freed
+from .regression import Fit, at_shapes, fast, freed
 from .significance import evenly
 
 # A wider kernel that passes less than this part of a term's force says nothing of it: what other
@@ -67,7 +67,7 @@ def by_rows(
         current = refitted(evidence, known, others.given, others.free, steps)
         return asked(current), evenly(len(evidence.rows), int(problem.block[-1]) + 1)
 
-    ours = spelled.estimates(asked(selection.last), rows.block, units)
+    ours = _with_structure(asked(selection.last), rows.block, units)
     delayed = traits(selection.last.terms[-1]).late
     problem, others = findings.undelayed if delayed else findings.recorded
     count = len(others.last.terms)
@@ -93,6 +93,35 @@ def by_rows(
         there = {id(term): each for term, each in zip(lasting.terms, values, strict=True)}
     both = zip_longest(ours[:count], wide, map(there.get, map(id, others.last.terms)))
     return [Estimates(*each) for each in both] + [Estimates(each) for each in late]
+
+
+def _with_structure(
+    current: Fit, block: np.ndarray, units: dict[str, str]
+) -> list[dict[str, Estimate]]:
+    """The parameters of each term; of a load that is stepped along the motion with errors that
+    contain what is left beside the noise, were all of it theirs.
+
+    The energy of such a law has many minima, each with a curvature of its own. What it lacks of the
+    machine (another part of the friction, a blow that is not straight between two samples) moves it
+    from one to the next, which no block and no width of the kernel tells.
+    """
+    found = spelled.estimates(current, block, units)
+    stepped = [number for number, term in enumerate(current.terms) if term.stepped]
+    if not stepped:
+        return found
+    structure = np.sqrt(max(current.energy - len(current.residual) * fast(current) ** 2, 0.0))
+    jacobian = current.jacobian
+    size = np.sqrt(np.sum(jacobian**2, axis=0))
+    size[size == 0] = 1.0
+    # Half of what it would be off by: the interval then reaches that far.
+    off = 0.5 * structure * np.linalg.norm(np.linalg.pinv(jacobian / size), axis=1) / size
+    for number in stepped:
+        pairs = zip(found[number].items(), off[current.indices(number)], strict=True)
+        found[number] = {
+            name: own._replace(standard_error=np.hypot(own.standard_error, more))
+            for (name, own), more in pairs
+        }
+    return found
 
 
 def _sizes(current: Fit) -> list[float]:

@@ -21,7 +21,7 @@ from ..transmission import (
     DryLoad,
     load_motion,
 )
-from .compliance import coasting
+from .compliance import coasting, uneven
 
 
 def play(recording: Recording, half_gap: Float[Array, ""]) -> Float[Array, " N"]:
@@ -231,7 +231,7 @@ def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     # is mostly as large as its dry one, or of no account.
     widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
     speeds = view.limits.fastest * np.array([1.0, 5.0])
-    return product([widths, windups, coasting(view), speeds, np.array([view.asymmetry])])
+    return product([widths, windups, coasting(view), speeds, uneven(view)])
 
 
 def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
@@ -244,7 +244,7 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     """
     if not isinstance(term, ElasticBacklash):
         return np.zeros((0, len(term.nonlinear)))
-    place = scattered(count, 5)
+    place = scattered(count, 4)
     low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5))))
     least = np.clip(0.25 * view.acceleration * (view.reach / 20) ** 2, low[0], 0.1 * high[0])
     stroke = view.limits.high - view.limits.low
@@ -254,8 +254,8 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     slowed = view.acceleration * 0.05 * 60.0 ** place[:, 2]  # at half the full speed
     ratio = 0.05 * 30.0 ** place[:, 3]  # viscous friction by dry friction there
     speed = 0.5 * view.limits.fastest / ratio
-    asymmetry = 2 * view.asymmetry * place[:, 4]  # the motor has none, or the load all of it
-    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, asymmetry], axis=1)
+    none = np.zeros(len(place))  # about the best of them it is looked for
+    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, none], axis=1)
     ends = inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5)))
     return np.clip(found, *ends)
 

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 from ...data.recording import Recording
 from ...units import DIMENSIONLESS, FORCE, FREQUENCY, INERTIA
 from ..base import AbstractTerm
-from ..effect import GRID, PASSED, Effect, Extent, View, inside
+from ..effect import GRID, PASSED, Effect, Extent, View, inside, product
 from ..presliding import AbstractStates, Instant, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
 from ..transmission import ASYMMETRY, DECELERATION, AbstractDryLoad, DryLoad, load_motion
@@ -229,6 +229,11 @@ _COASTING = (0.2, 0.6, 2.0, 6.0)
 SWINGING = 0.5
 
 
+def uneven(view: View) -> np.ndarray:
+    """Asymmetries of a load: none, or that of all the machine's friction."""
+    return np.unique([0.0, view.asymmetry])
+
+
 def coasting(view: View) -> np.ndarray:
     """Decelerations, m/s², at which a load would coast to rest."""
     return view.acceleration * np.array(_COASTING)
@@ -241,7 +246,8 @@ def resonances(term: AbstractTerm, view: View) -> np.ndarray:
     high = max(min(most, PASSED / view.reach), 2 * low)
     swinging = [(f, z) for z in _DAMPING for f in np.geomspace(low, high, GRID)]
     if isinstance(term, DryCompliance):
-        return np.array([(*p, d, view.asymmetry) for p in swinging for d in coasting(view)])
+        own = product([coasting(view), uneven(view)])
+        return np.array([(*place, *slowed) for place in swinging for slowed in own])
     return np.array(swinging)
 
 

@@ -210,8 +210,11 @@ def _flanks(truth, n):
     reduced = _reduced(truth, n.mass)
     stiff = np.sqrt(2 * truth["backlash_force"] / (truth["half_gap"] * reduced))
     rate = min(max(truth["contact_rate"], stiff), _RESOLVED / n.substep)
-    windup = truth["backlash_force"] / (reduced * rate**2)
-    return truth | {"contact_rate": float(rate), "windup": float(windup)}
+    # A definition may have drawn another share of the friction.
+    force = truth["load_friction_share"] * n.coulomb
+    windup = force / (reduced * rate**2)
+    follow = {"backlash_force": force, "contact_rate": rate, "windup": windup}
+    return truth | {name: float(value) for name, value in follow.items()}
 
 
 def _reduced(truth, mass):
