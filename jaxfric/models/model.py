@@ -272,7 +272,7 @@ def from_parameters(
     if missing:
         own = dict(zip(names[len(term.affine) :], np.asarray(term.beta()), strict=True))
         known = {name: own[name] for name in missing if np.isfinite(own.get(name, np.nan))}
-        missing, values = [name for name in missing if name not in known], {**known, **values}
+        missing, values = [name for name in missing if name not in known], known | dict(values)
     if missing:
         raise ValueError(f"Missing parameter {listed(missing)}; the model needs {listed(names)}.")
     empty = Model(term, jnp.zeros(len(term.affine)), tuple((units or {}).items()))

@@ -28,9 +28,9 @@ def _sided(scales):
     return -0.8, 0.8
 
 
-# Of friction that differs by direction a twentieth decides when a load strikes.
+# None, and much of it either way; the refinement goes on from there.
 ASYMMETRY = Parameter(
-    "load_asymmetry", DIMENSIONLESS, _sided, logarithmic=False, resolution=Resolution(1, 1, None, 3)
+    "load_asymmetry", DIMENSIONLESS, _sided, logarithmic=False, resolution=Resolution(1, 2, None, 3)
 )
 
 

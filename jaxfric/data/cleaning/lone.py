@@ -60,7 +60,7 @@ def lone_samples(
     """
     if np.count_nonzero(mask) < FEWEST:
         return {}
-    found = {"force": far_forces(signals["force"], mask)}
+    found = {"force": far_forces(signals["force"], mask)} if "force" in signals else {}
     linked = adjacent(signals["time"], mask, segment)
     whole = linked[1:] & linked[:-1]
     if np.count_nonzero(whole) > FEWEST:

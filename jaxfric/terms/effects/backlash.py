@@ -184,9 +184,9 @@ class DampedBacklash(ElasticBacklash):
     """[`ElasticBacklash`][] with a load that has viscous friction too, F_L (sign w + α + w/v_s).
 
     `viscous_speed` v_s, m/s: there it is as large as the dry friction F_L. So a load that flies
-    through the gap is slowed by (1 ± α + w/v_s) d. `load_asymmetry` α: by how much of its mean
-    dry friction is more forwards and less backwards, as of a load with a weight, which alone
-    decides when it leaves a flank and strikes the other one.
+    through the gap is slowed by (1 ± α + w/v_s) d. `load_asymmetry` α: which part of the mean of
+    its dry friction is more forwards and less backwards, as it also seems to be where the load has
+    a weight. When it leaves a flank, and strikes the other one, depends on it.
     """
 
     viscous_speed: Float[Array, ""] | float = UNKNOWN
@@ -199,10 +199,7 @@ class DampedBacklash(ElasticBacklash):
 
     def burden(self, beta, alpha) -> Burden:
         burden = super().burden(beta[:3], alpha)
-        factors = (1.0, 1.0, np.nan, 1.0, 1.0)
-        return burden._replace(
-            lighter=lambda factor: beta * np.where(np.isnan(factors), factor, factors)
-        )
+        return burden._replace(lighter=lambda factor: beta * np.array([1, 1, factor, 1, 1]))
 
     @property
     def load(self) -> DryLoad:
