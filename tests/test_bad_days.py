@@ -602,6 +602,7 @@ def test_a_note_or_a_refusal_of_predict():
         commands._unknown(a_model(), blank, ~moving, arguments)
 
 
+@pytest.mark.slow
 def test_an_identified_direction_that_is_not_there_is_no_zero():
     time = np.arange(400) / 500
     velocity = 0.1 * (1 - np.cos(2 * np.pi * time / 0.4))

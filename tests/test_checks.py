@@ -91,6 +91,7 @@ def test_a_velocity_in_another_unit_or_direction(factor, name, said):
     assert found[0].severe is (name != "velocity_gain")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.97, 1.01])
 def test_a_scale_a_little_off_is_told_and_is_in_the_intervals(factor):
     sound = log()
@@ -145,6 +146,7 @@ def test_a_velocity_of_another_axis_and_a_late_one():
     assert remark.name == "velocity_shifted" and "-0.05" in remark.text
 
 
+@pytest.mark.slow
 def test_a_velocity_that_is_late_does_not_make_the_friction_wrong():
     sound = log()
     speed = np.asarray(sound.velocity)
@@ -288,6 +290,7 @@ def test_a_gain_of_its_own_for_each_sign_and_a_short_delay():
     assert abs(fit(fast, late, time)["force_late"] - 0.008) < 0.001
 
 
+@pytest.mark.slow
 def test_friction_that_differs_by_direction_is_no_gain():
     """Beside a model that ties the directions; a gain that the inertia feels too stays one."""
     t = np.arange(16000) / 1000

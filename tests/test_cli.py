@@ -434,6 +434,7 @@ def test_a_real_axis(data_folder, capsys):
     assert values["viscous-"] == pytest.approx(240.4, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_held_force_is_aligned_on_request(tmp_path, capsys):
     t = np.arange(2000) / 100.0
     values = {"inertia": 5.0, "coulomb+": 20.0, "viscous+": 60.0, "coulomb-": 21.0,

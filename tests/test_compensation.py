@@ -34,6 +34,7 @@ def test_the_whole_force_goes_with_the_machines_own_model():
     assert found.run.channels["compensation"].shape == TIME.shape
 
 
+@pytest.mark.slow
 def test_what_is_left_is_what_the_drive_does_not_know():
     """Slow motion: the controller bears the missing Coulomb force, and the error is that by kp."""
     lacking = machine(**{"coulomb+": 12.0, "coulomb-": 12.0})

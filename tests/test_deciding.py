@@ -54,6 +54,7 @@ def test_a_motion_on_which_they_are_alike_does_not(model):
     }
 
 
+@pytest.mark.slow
 def test_a_model_without_the_effect_is_refused(model):
     with pytest.raises(ValueError, match="no term of the effect 'cogging'"):
         decide(model, "cogging", ("spring",), log(0.2, np.zeros_like))

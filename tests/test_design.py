@@ -67,6 +67,7 @@ def test_the_axis_comes_into_it_from_rest_within_the_limits():
         np.testing.assert_allclose(slope, wanted[2:-2], atol=0.02 * np.max(np.abs(wanted)))
 
 
+@pytest.mark.slow
 def test_no_motion_of_the_plain_sine_is_better(axis, found):
     before, after = (np.array([getattr(g, n) for g in found.gains.values()])
                      for n in ("before", "after"))  # fmt: skip

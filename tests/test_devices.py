@@ -86,6 +86,7 @@ def agree(found, expected):
         np.testing.assert_allclose(found[name], rows, rtol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_one_device_does_all_rows(expected):
     found = devices.identify(
         "coulomb-viscous", jf.stack(recordings()), projection=jf.ClosedWindows()

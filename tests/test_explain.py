@@ -576,6 +576,7 @@ def test_what_takes_half_of_few_rows_by_chance_is_not_believed():
     assert np.mean(found[:, 0] > found[:, 1]) <= 0.03
 
 
+@pytest.mark.slow
 def test_a_tone_returns_in_another_recording_at_any_phase(healthy):
     """Their clocks begin at different times; at half of its amplitude it has not returned."""
     term, alpha, beta = CASES["periodic_disturbance"]
@@ -865,6 +866,7 @@ def test_nothing_is_refined_where_nothing_could_be_selected(healthy, monkeypatch
     assert asked >= linear
 
 
+@pytest.mark.slow
 def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
     """From wherever its grid point lies; a step of the cost at every node stops a descent."""
     for moment in (6.0, 7.03, 9.511):
@@ -890,6 +892,7 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
     assert all(not len(contest._between(trial._replace(candidate=c))) for c in waves)
 
 
+@pytest.mark.slow
 def test_force_and_motion_are_aligned_by_the_first_term_before_others_compete(healthy, monkeypatch):
     """The rows that the others see do not hold what the base alone took for lateness."""
     run = planted(healthy[0], terms.Cogging(), (2.0, 1.5), (0.013,))
@@ -1193,6 +1196,7 @@ def test_a_held_out_recording_of_another_rate_is_seen_through_the_same_kernel(he
     assert held.limits.interval == pytest.approx(3 * posed.evidence.limits.interval, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
     term, alpha, beta = CASES["sticky_spot"]
     run = planted(healthy[0], term, alpha, beta)
@@ -1206,6 +1210,7 @@ def test_a_place_counts_that_the_held_out_recording_shows_too(healthy):
         assert (structure.lasting([spot], posed.base, posed) == [spot]) is there
 
 
+@pytest.mark.slow
 def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(healthy):
     """Of the places of the narrow rows, the wide ones keep the curve that is there."""
     run, posed = healthy[0], problem.problem_of(healthy[0], models.named("gaussian"))
@@ -1476,6 +1481,7 @@ def test_a_wrong_value_shows_through_a_wider_kernel_too(healthy):
     assert mismatch.mismatch(known, *posed, as_known.wide) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drags", [True, False])
 def test_one_effect_stands_for_several_wrong_values_where_it_says_as_much(healthy, drags):
     """Friction and damping of other values take the larger part of a drag."""
@@ -1529,6 +1535,7 @@ def test_friction_of_one_direction_is_no_wrong_friction_and_a_constant_force(hea
     assert f"{side} there is -" in finding.sentence
 
 
+@pytest.mark.slow
 def test_the_error_of_a_wrong_value_holds_what_another_recording_says(healthy):
     """Two recordings with gains of 1.10 and 1.12 leave a value open by their difference."""
     rng = np.random.default_rng(0)
@@ -1568,6 +1575,7 @@ def test_a_finding_that_the_held_out_recording_shows_but_is_worse_with_says_so()
     assert "does not bear it out" in reported._reason(finding._replace(confirmed=False), better)
 
 
+@pytest.mark.slow
 def test_a_command_that_does_not_arrive_is_a_limit_of_the_force(healthy, capsys):
     for limit in (38.0, 46.0):
         motion = motion_of(limited(0, limit))

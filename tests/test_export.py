@@ -165,6 +165,7 @@ def test_every_law_of_the_present_motion_is_tried():
     assert tried >= spelled - plain and len(spelled) > 25
 
 
+@pytest.mark.slow
 @needs_cc
 def test_c_computes_the_library_s_force(compiled):
     signals = motion()
@@ -232,6 +233,7 @@ def parsed(text):
     return {name: float(value) for name, value in parameters}, dict(equations)
 
 
+@pytest.mark.slow
 def test_modelica_computes_the_library_s_force():
     known, (x, v, a, t) = everything(), motion()
     parameters, equations = parsed(export(known, "modelica").text)

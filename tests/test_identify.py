@@ -107,6 +107,7 @@ def test_a_batch_keeps_failures_in_their_row():
     assert bool(jnp.isinf(found.parameters["coulomb+"].standard_error[1]))
 
 
+@pytest.mark.slow
 def test_a_model_that_leaves_most_of_the_force_is_said_to():
     good = recording(machine("coulomb-viscous"), noise=0.1)
     hidden = dataclasses.replace(good, force=good.force + 40 * jnp.sin(40 * good.position))
@@ -127,6 +128,7 @@ def test_throw_raises_with_the_diagnosis():
         jf.identify("coulomb-viscous", jf.stack([good, rest]), throw=True)
 
 
+@pytest.mark.slow
 def test_one_direction_alone_leaves_the_other_infinitely_uncertain():
     full = recording(machine("coulomb-viscous"), noise=0.1)
     forward = dataclasses.replace(full, mask=full.velocity > 0)
@@ -330,6 +332,7 @@ def test_what_is_off_by_a_twentieth_for_a_held_force_is_told():
     assert not found.remarks and off(found).max() < 1
 
 
+@pytest.mark.slow
 def test_rows_of_a_batch_are_aligned_each_by_itself():
     logs = [held(key=1), held(key=2)]
     t = logs[1].time
@@ -366,6 +369,7 @@ def stamped(late=0):
     return jax.tree.map(lambda x: x[20:-20], dataclasses.replace(run, force=force))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("align", [False, True])
 @pytest.mark.parametrize("late", [-3, 2, 4])
 def test_a_force_that_is_late_by_cycles_is_told(late, align):
@@ -409,6 +413,7 @@ def test_a_force_of_the_wrong_sign_is_no_load():
     assert [remark.name for remark in found.remarks] == ["negative_parameter"]
 
 
+@pytest.mark.slow
 def test_a_direction_that_never_moved_is_named():
     run = recording(machine(), noise=0.05)
     kept = np.asarray(run.velocity) > 0
@@ -419,6 +424,7 @@ def test_a_direction_that_never_moved_is_named():
     assert f"Not determined: {names}." in found.diagnosis
 
 
+@pytest.mark.slow
 def test_an_offset_beside_friction_of_each_direction_is_told():
     run = recording(machine("coulomb-viscous"), noise=0.1)
     found = jf.identify(jf.models.coulomb_viscous() + jf.terms.Offset(), run)
@@ -474,6 +480,7 @@ def test_a_row_of_a_batch_says_what_it_says_alone():
     assert batch.projection == "mixed"
 
 
+@pytest.mark.slow
 @given(padding=st.integers(0, 5000))
 @settings(max_examples=4, deadline=None)
 def test_what_a_recording_is_padded_with_moves_no_interval(padding):
@@ -615,6 +622,7 @@ def test_a_term_of_the_others_force_is_refused_by_its_name():
     assert "jaxfric.explain(recording, fit) finds them" in str(e.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("recorded", [True, False])
 def test_a_given_width_gives_inside_jit_what_a_call_gives(recorded):
     log = recording(machine(), noise=0.3)

@@ -110,6 +110,7 @@ def test_a_rate_is_over_zero(timeless, rate, capsys):
     assert "is not a number" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_command_identifies_at_a_stated_rate(timeless, capsys, monkeypatch):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     assert main(["identify", timeless, "--rate", "1000", "--model", "coulomb-viscous"]) == 0

@@ -61,6 +61,7 @@ def never_worse(found):
             assert found.fit[key]["after"] <= found.fit[key]["before"] * (1 + 1e-6), key
 
 
+@pytest.mark.slow
 def test_the_figures_are_those_of_the_saved_model_and_a_subtraction(healthy):
     run, held = (planted(each, *CASES["cogging"]) for each in healthy)
     found = explain(run, "gaussian", held)

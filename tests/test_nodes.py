@@ -96,6 +96,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_nodes_find_what_the_samples_find(name):
     data, low, high = CASES[name]

@@ -85,6 +85,7 @@ def test_an_axis_that_yields_is_told_from_one_that_sticks(force_unit, unit):
         assert not yields(sticking(seed=seed, force_unit=force_unit, unit=unit))
 
 
+@pytest.mark.slow
 def test_a_curve_between_updates_of_the_position_is_no_motion():
     """It leaves the rest up to two samples before the axis breaks away."""
     machine = concealed.draw(1462541569, (), (0.1, 0.3), {"log": "held_position"})
@@ -119,6 +120,7 @@ def test_another_zero_in_each_part_of_a_log_is_no_noise():
     assert yields(parts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("force_unit", "unit"), [(1.0, 1.0), (1e-6, 1e3)])
 def test_an_axis_that_creeps_over_is_told_from_one_that_yields(force_unit, unit):
     """Below the slowest speed that is told from rest it is no friction over a distance."""

@@ -77,6 +77,7 @@ def test_nothing_is_nothing(motion):
         ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [0, 1])
 def test_a_wrong_zero_is_a_zero_and_no_mass(motion, joint):
     time, position, force = motion

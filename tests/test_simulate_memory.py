@@ -229,6 +229,7 @@ def pushed(model, force, seconds, step):
     return (np.asarray(each) for each in (run.time, run.position, run.velocity))
 
 
+@pytest.mark.slow
 def test_a_force_on_the_motor_makes_it_swing_against_its_load():
     """Without friction: x = u t²/(2 M) + (M_L/M) s, s = (1 − cos Ωt) u/((M − M_L) Ω²)."""
     values = {"load_inertia": 2.0, "load_resonance": 12.0, "damping_ratio": 0.0}

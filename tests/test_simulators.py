@@ -25,6 +25,7 @@ def simulator(**wrong):
     return lambda recording: predict(model, recording)
 
 
+@pytest.mark.slow
 def test_a_simulator_that_is_right_stays_as_it_is(healthy):
     found = explain(healthy[0], simulator(), healthy[1])
     assert found.verdict == "consistent" and found.findings == []

@@ -36,6 +36,7 @@ def test_invert_upper(count):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "projection", [jf.ClosedWindows(), jf.WeakForm(16)], ids=["closed", "weak"]
 )

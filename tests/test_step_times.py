@@ -88,6 +88,7 @@ def test_a_step_at_rest_is_anywhere_in_the_rest():
     assert 4.0 < low < 4.4 and 5.4 < high < 5.8
 
 
+@pytest.mark.slow
 def test_the_time_of_a_step_that_noise_hides_is_hardly_known():
     run = log(T.Coulomb(), np.array([0.02]), 7.41, noise=1.0)
     found = jf.identify(BASE + T.FrictionStep(), run)

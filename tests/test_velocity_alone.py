@@ -127,6 +127,7 @@ def test_a_wave_of_several_harmonics_is_sought_over_its_whole_period():
     assert places[-1] - places[0] == pytest.approx(2 * (seen.limits.high - seen.limits.low))
 
 
+@pytest.mark.slow
 def test_friction_alone_needs_no_word_of_a_position():
     time = np.arange(6000) / 500
     given = log(0.0, 3)
