@@ -80,8 +80,8 @@ def may_be_none(
             return bool(low * high > 0)
         least, most = tested(other[name]).interval()
         apart = abs(float(own[name].value) - float(other[name].value))
-        within = np.hypot(*(float(each[name].half_width()) for each in (own, other)))
-        return bool(apart <= within or (least > 0 if low > 0 else most < 0))
+        half, theirs = (float(each[name].half_width()) for each in (own, other))
+        return bool(apart <= np.hypot(half, theirs) or (least > 0 if low > 0 else most < 0))
 
     names = [name for name in own if name.startswith("amplitude")]
     return not any(sure(name) for name in (*names, *(p.name for p in term.affine)))
