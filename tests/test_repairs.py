@@ -385,8 +385,10 @@ def test_lone_samples_that_nothing_made_are_masked(role, count, start, size, sig
     assert np.flatnonzero(~tidy.mask).tolist() == list(range(start, start + count))
     (note,) = tidy.notes
     assert f"with a {role} far from all others" in note and f"row {start + 2})" in note
-    off = np.max(np.abs(tidy.signals[role] - truth[role])[bad])
-    assert off < 0.05 * np.ptp(truth[role]) or role == "force"
+    # Filled by a straight line; of the force nobody can say how it went.
+    if role != "force":
+        off = np.abs(tidy.signals[role] - truth[role])[bad]
+        assert np.max(off) < 1e-3 * np.ptp(truth[role])
 
 
 @pytest.mark.parametrize("kind", ["hit", "wrap", "seam", "lost rows", "push", "stairs"])

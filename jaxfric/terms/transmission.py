@@ -49,7 +49,7 @@ class _Flank(NamedTuple):
     decay: Float[Array, ""] | float
 
     def dry(self, side):
-        """d, m/s², of a load that goes or is pushed to a side."""
+        """d, m/s², without a sign, of a load that goes or is pushed to a side."""
         return jnp.where(side < 0, self.backward, self.forward)
 
     def push(self, over, slip):
@@ -252,15 +252,15 @@ class DryLoad(NamedTuple):
     decay: Float[Array, ""] | float = 0.0
     asymmetry: Float[Array, ""] | float = 0.0
 
-    def dry(self, side):
-        """What slows a load that goes or is pushed to a side, by dry friction, signed, m/s²."""
+    def friction(self, side):
+        """The dry friction of a load that goes or is pushed to a side, per mass, signed, m/s²."""
         return (jnp.sign(side) + self.asymmetry * jnp.abs(jnp.sign(side))) * self.deceleration
 
     def start(self, velocity: Float[Array, ""]) -> States:
         """In slip, wound up by the load's friction."""
         side = jnp.sign(velocity)
         gap = 0.0 if self.half_gap is None else self.half_gap
-        slips = self.dry(side) + self.decay * velocity
+        slips = self.friction(side) + self.decay * velocity
         wound = side * gap + slips / self.omega**2
         return States(jnp.stack([wound, velocity]), jnp.stack([side, side]))
 
@@ -278,7 +278,7 @@ class DryLoad(NamedTuple):
         """The derivative of `flow`."""
         side = states.kept[0]
         load = states.flow[1]
-        slowed = self.push(states, now.velocity) - self.dry(side) - self.decay * load
+        slowed = self.push(states, now.velocity) - self.friction(side) - self.decay * load
         slip = now.velocity - load
         return jnp.stack([slip, jnp.where(side == 0, 0.0, slowed)])
 
@@ -290,7 +290,7 @@ class DryLoad(NamedTuple):
             flank = jnp.where(jnp.abs(ahead) >= self.half_gap, jnp.sign(ahead), 0.0)
         at = States(states.flow, jnp.stack([flank, flank]))
         push = self.push(at, now.velocity)
-        breaks = jnp.where(jnp.abs(push) > jnp.abs(self.dry(push)), jnp.sign(push), 0.0)
+        breaks = jnp.where(jnp.abs(push) > jnp.abs(self.friction(push)), jnp.sign(push), 0.0)
         side = jnp.where(load == 0, breaks, jnp.sign(load))
         return States(states.flow, jnp.stack([side, flank]))
 

@@ -140,7 +140,7 @@ class ElasticBacklash(AbstractDryLoad):
     def columns_and_momentum(self, recording):
         held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
-        plain = held - self.load.dry(motor) - self.decay * motor
+        plain = held - self.load.friction(motor) - self.decay * motor
         return tuple(x[:, None] / self.load_deceleration for x in (plain, speed - motor))
 
     @property
@@ -169,7 +169,7 @@ class ElasticBacklash(AbstractDryLoad):
         return jnp.sqrt(self.load_deceleration / self.windup)
 
     def present(self, states, now):
-        push = self.load.push(states, now.velocity) - self.load.dry(now.side)
+        push = self.load.push(states, now.velocity) - self.load.friction(now.side)
         return (push / self.load_deceleration)[None]
 
 

@@ -193,12 +193,12 @@ class DryCompliance(AbstractDryLoad):
     def columns_and_momentum(self, recording):
         held, speed = load_motion(recording, *self.load)
         motor = recording.velocity.astype(speed.dtype)
-        return (held - self.load.dry(motor))[:, None], (speed - motor)[:, None]
+        return (held - self.load.friction(motor))[:, None], (speed - motor)[:, None]
 
     @property
     def load(self) -> DryLoad:
-        load = DryLoad(self.pace, self.damping_ratio, self.load_deceleration)
-        return load._replace(asymmetry=self.load_asymmetry)
+        known = self.pace, self.damping_ratio, self.load_deceleration
+        return DryLoad(*known, asymmetry=self.load_asymmetry)
 
     @property
     def shed(self):
@@ -218,7 +218,7 @@ class DryCompliance(AbstractDryLoad):
 
     def present(self, states, now):
         push = self.load.push(states, now.velocity)
-        return (push - self.load.dry(now.side))[None]
+        return (push - self.load.friction(now.side))[None]
 
 
 # Damping ratios tried: a drive train's, a belt's, a soft coupling's.
