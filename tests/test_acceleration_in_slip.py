@@ -41,6 +41,7 @@ def test_an_answer_of_few_samples_is_followed_and_what_is_left_is_unsure():
     assert np.all(off <= np.abs(unsure[:, 1:6]) + 1e-9)
 
 
+@pytest.mark.slow
 def test_noise_bends_nothing():
     log, _ = strokes(30.0, noise=0.05)
     slope, _ = found(log)

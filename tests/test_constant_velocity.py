@@ -118,6 +118,7 @@ def test_ramps_and_tips_are_no_constant_velocity():
     assert "none was held long enough" in sentence(test, {"position": "m", "force": "N"})
 
 
+@pytest.mark.slow
 def test_other_terms_are_taken_off_first():
     model = jf.models.coulomb_viscous() + jf.terms.Spring()
     recording = staircase(lambda v: np.where(v, 10 * np.sign(v) + 40 * v, 0.0))
@@ -145,6 +146,7 @@ def test_it_is_drawn_and_takes_one_recording_only():
         jf.constant_velocity(jf.stack([recording] * 2))
 
 
+@pytest.mark.slow
 def test_emps_has_three_speeds_each_way(data_folder):
     emps = {"columns": {"force": "vir", "position": "qm", "reference": "qg"}}
     recording = jf.read(data_folder / "emps" / "DATA_EMPS.mat", **emps, scale={"force": 35.15065})

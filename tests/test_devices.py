@@ -101,6 +101,7 @@ def test_a_single_recording_is_refused():
         devices.identify("coulomb-viscous", recordings()[0])
 
 
+@pytest.mark.slow
 def test_throw_names_the_row():
     with pytest.raises(ValueError, match="Row 3.*never slips"):
         devices.identify(

@@ -24,6 +24,7 @@ def seen(run, held=None):
         return stopped(motion, problem, None if held is None else motion_of(held))
 
 
+@pytest.mark.slow
 def test_a_hard_stop_is_named_with_its_place_and_nothing_else():
     """Standing at it shows in no row: this axis was "consistent", and end stops "would have been
     seen from" a thousandth of its force.

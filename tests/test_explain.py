@@ -276,6 +276,7 @@ def test_the_answer_does_not_depend_on_units_time_or_direction(healthy):
     assert float(theirs["pitch"].value) == pytest.approx(1e3 * float(ours["pitch"].value), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_wrong_value_is_told_from_missing_physics(healthy):
     wrong = PARAMETERS | {"viscous+": 90.0, "inertia": 5.5}
     model = models.from_parameters(models.gaussian(), wrong)
@@ -980,6 +981,7 @@ def test_terms_that_make_each_other_idle_do_not_take_turns_for_ever(healthy, mon
     assert found.selected == []
 
 
+@pytest.mark.slow
 def test_a_winner_beside_which_more_is_left_than_before_is_none(healthy, monkeypatch):
     """As of a law that acts on the force that the model predicted without it."""
     term, alpha, beta = CASES["cogging"]
@@ -1307,6 +1309,7 @@ def test_a_finding_needs_its_signal_in_the_held_out_recording(healthy):
     holdout.check_signals(found, run, run)
 
 
+@pytest.mark.slow
 def test_columns_serve_again_where_only_the_force_was_shifted(healthy):
     gaussian = models.named("gaussian")
     motion = motion_of(healthy[0])
@@ -1725,6 +1728,7 @@ def test_a_finding_is_not_nil_within_its_error(healthy, term, size):
     assert nil == ([0] if size == 0.0 else [])
 
 
+@pytest.mark.slow
 def test_where_a_finding_is_nil_others_compete(healthy, monkeypatch):
     run = planted(healthy[0], *CASES["cogging"])
     posed = problem.problem_of(run, models.named("gaussian"))

@@ -51,6 +51,7 @@ def interpreted(text):
     return call
 
 
+@pytest.mark.slow
 def test_a_block_computes_the_library_s_force_and_friction():
     signals, whole = motion(), everything()
     call = interpreted(export(whole, "st").text)

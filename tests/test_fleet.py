@@ -69,6 +69,7 @@ def run(*arguments):
 # ---- the whole way ----
 
 
+@pytest.mark.slow
 def test_a_fleet_becomes_a_table_a_picture_and_words(logs, tmp_path, capsys):
     out, picture = tmp_path / "fits.parquet", tmp_path / "fits.png"
     assert run(logs / "**" / "*.*", "--out", out, "--plot", picture) == 0

@@ -379,6 +379,7 @@ def test_a_force_that_is_late_by_cycles_is_told(late, align):
     assert float(remark.text.split()[1]) == pytest.approx(late / 250, rel=0.4)
 
 
+@pytest.mark.slow
 def test_a_force_at_its_stamp_stays_there():
     run = stamped()
     found = jf.identify("coulomb-viscous", run, align=True)

@@ -218,6 +218,7 @@ def test_a_force_of_the_wrong_sign_is_said_to_be(healthy):
     never_worse(found)
 
 
+@pytest.mark.slow
 def test_a_dead_sensor_is_not_consistent(healthy):
     noise = np.random.default_rng(5).normal(size=TIME.size)
     found = explain(with_force(healthy[0], noise))
@@ -367,6 +368,7 @@ def test_a_position_that_came_at_fewer_samples_tells_no_acceleration():
     assert len(Prepared.of(dataclasses.replace(run, position=gap)).choices) == 1
 
 
+@pytest.mark.slow
 def test_a_late_velocity_that_ends_in_motion_does_not_spoil_the_error():
     """Taken earlier, it is not known at the end, and its derivative not beside it."""
     time = np.arange(8000) / 2000

@@ -117,6 +117,7 @@ def test_nodes_find_what_the_samples_find(name):
     assert np.all(reached <= np.min([cost((b, b), *data) for b in grid], axis=0) * (1 + 1e-12))
 
 
+@pytest.mark.slow
 def test_beyond_the_range_of_the_panels_digits_go_gradually():
     """Bounds of a hundred nanometres a second: panels grow tenfold, ten digits of L are left."""
     data = case(1e-3, 0.1, 0.02)

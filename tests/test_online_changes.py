@@ -154,6 +154,7 @@ def watched(path, capsys):
     return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
 
 
+@pytest.mark.slow
 def test_watch_tells_learning_errors_and_faults(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("JAXFRIC_CACHE", "off")
     path = tmp_path / "axis.csv"

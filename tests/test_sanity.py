@@ -216,6 +216,7 @@ def test_forces_are_swapped_on_a_robot_that_pauses(motion):
         assert "shoulder_force=NAME,elbow_force=NAME" in each.wrong
 
 
+@pytest.mark.slow
 def test_angles_in_degrees_and_columns_of_whole_joints_that_are_swapped(motion):
     time, position, force = motion
     for each in check_logs(parts(time, np.rad2deg(position), force)):
@@ -229,6 +230,7 @@ def test_angles_in_degrees_and_columns_of_whole_joints_that_are_swapped(motion):
         assert "elbow_position=NAME,elbow_force=NAME" in each.wrong
 
 
+@pytest.mark.slow
 def test_beside_forces_that_are_swapped_no_value_is_told(motion):
     swapped = parts(*motion)[1]
     other = dataclasses.replace(swapped.recording, force=parts(*motion)[0].recording.force)

@@ -103,6 +103,7 @@ FAULTS = [gone, spiked, clipped, held, drawn, counted, filled, frozen, overflowi
 FAULTS += [accelerating, one_way, one_speed, quick, resting, broken, far_too_fast, ending]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 2**20), st.sets(st.sampled_from(FAULTS), max_size=2))))
 def test_only_rows_without_faults_are_not_looked_at(rows):

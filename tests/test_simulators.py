@@ -96,6 +96,7 @@ def test_a_bump_beside_dry_friction_that_is_wrong(healthy):
     assert float(bump["stribeck_force+"].value) == pytest.approx(6.6, rel=0.1)
 
 
+@pytest.mark.slow
 def test_the_saved_model_stands_on_the_simulators_force(healthy, tmp_path):
     run = planted(healthy[0], *CASES["spring"])
     found = explain(run, simulator())
@@ -126,6 +127,7 @@ def test_arrays_channels_and_functions_say_the_same(healthy):
     assert not np.asarray(Known(gone).beside(healthy[0]).mask)[:100].any()
 
 
+@pytest.mark.slow
 def test_a_baseline_without_it_does_not_read_the_simulators_force(healthy):
     run = simulators.along(healthy[0], np.zeros(healthy[0].num_samples))
     ours, theirs = explain(run, "gaussian"), explain(healthy[0], "gaussian")
