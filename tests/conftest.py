@@ -19,6 +19,10 @@ from jaxfric import programs
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 jax.config.update("jax_numpy_rank_promotion", "raise")
+# Thousands of small programs are lowered: that each operation says which lines it comes from, and a
+# search for garbage after each 700 objects, are a fifteenth of the tests' time.
+jax.config.update("jax_traceback_in_locations_limit", 0)
+gc.set_threshold(100_000, 50, 1000)
 
 # Most of the tests' time is compiling: programs that run once need no optimisation. Benchmarks and
 # the documentation's pages compile as users do.

@@ -239,7 +239,7 @@ def uniform(recording: Recording) -> Recording:
     steps = PADDING if power >= LONG else (1, 2)
     length = next(int(f * power) for f in steps if f * power >= recording.num_samples)
     pieces = 1 << (recording.num_segments - 1).bit_length()
-    return _anonymous(pad(recording, length), pieces)
+    return anonymous(pad(recording, length), pieces)
 
 
 def row_of(batch: Any, number: int) -> Any:
@@ -269,7 +269,7 @@ def stack(recordings: Sequence[Recording]) -> Recording:
     length = max(recording.num_samples for recording in recordings)
     segments = max(recording.num_segments or 1 for recording in recordings)
     leaves = [jax.tree.leaves(pad(recording, length)) for recording in recordings]
-    structure = jax.tree.structure(_anonymous(first, segments))
+    structure = jax.tree.structure(anonymous(first, segments))
     return jax.tree.unflatten(
         structure, [jnp.stack(column) for column in zip(*leaves, strict=True)]
     )
@@ -291,7 +291,8 @@ def _kinds(recording: Recording) -> Mapping[str, object]:
     return {"signals": (*present, *sorted(recording.channels)), "units": recording.unit_names}
 
 
-def _anonymous(recording: Recording, segments: int) -> Recording:
+def anonymous(recording: Recording, segments: int = 1) -> Recording:
+    """A recording without what else a compiled program would be made for, but units and signals."""
     return dataclasses.replace(
         recording, source="", sha256="", num_segments=segments, position_every=1
     )

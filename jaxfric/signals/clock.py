@@ -20,6 +20,8 @@ def is_traced(tree: Any) -> bool:
 
 def interval(recording: Recording) -> Float[Array, ""]:
     """The typical sampling interval: the median over the valid steps, s."""
+    if not is_traced(recording):
+        return jnp.asarray(host_interval(recording), recording.time.dtype)
     steps = jnp.where(_linked(recording), jnp.diff(recording.time), jnp.nan)
     return quantile(steps, 0.5)
 

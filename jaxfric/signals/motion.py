@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple, Self
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
@@ -103,6 +104,8 @@ def velocity_noise(recording: Recording, typical: Float[Array, ""]) -> Float[Arr
 
 def scales(recording: Recording) -> Scales:
     """Magnitudes of a prepared recording, from which bounds and thresholds are derived."""
+    if not is_traced(recording):
+        return jax.tree.map(jnp.asarray, host_scales(recording)[0])
     valid = recording.mask
     speed = jnp.where(valid, jnp.abs(recording.velocity), jnp.nan)
     fastest, typical = quantile(speed, 0.98), interval(recording)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from .. import signals
-from ..data.recording import Recording
+from ..data.recording import Recording, anonymous
 from ..models import Model
 from . import actuator as faults
 from .checking import check, check_memory
@@ -104,17 +104,19 @@ def simulate(
         substeps = default_substeps(model, reference, smooth)
     force_key, encoder_key = (None, None) if key is None else jax.random.split(key)
     model, controller, encoder = cast((model, controller, encoder), reference.time.dtype)
-    held = _held(reference, controller, encoder, encoder_key, initial)
-    model, actuator = faults.parted(model, _shortest(model, held))
+    model, actuator = faults.parted(model, _shortest(model, reference))
     smooth = None if smooth is None else jnp.asarray(smooth, reference.time.dtype)
     parts = model, actuator, controller, encoder
-    force, position, velocity = _integrate(*parts, held, substeps, smooth)
+    if initial is not None:
+        initial = tuple(jnp.asarray(each, reference.time.dtype) for each in initial)
+    given = anonymous(reference), encoder_key, initial
+    (force, position, velocity), goal = _integrate(*parts, *given, substeps, smooth)
     if force_key is not None:
         noise = jax.random.normal(force_key, force.shape, force.dtype)
         force = force + jnp.asarray(force_noise, force.dtype) * noise
     channels = dict(reference.channels)
     if controller is not None:
-        channels["reference"] = held.reference
+        channels["reference"] = goal
     return dataclasses.replace(
         reference,
         force=force,
@@ -142,23 +144,24 @@ def _held(reference, controller, encoder, key, initial) -> _Held:
         goal_velocity,
         dict(reference.channels),
         restart,
-        zeros + jnp.asarray(first, dtype),
-        zeros + jnp.asarray(first_velocity, dtype),
+        zeros + first,
+        zeros + first_velocity,
         zeros if encoder is None else encoder.draw(key, time.shape[0], dtype),
     )
 
 
-def _shortest(model, held: _Held) -> float | None:
+def _shortest(model, reference: Recording) -> float | None:
     """The shortest time between two samples, s; `None` inside `jax.jit`."""
-    if signals.is_traced((model, held)):
+    if signals.is_traced((model, reference)):
         return None
-    steps = np.asarray(held.interval)
-    return float(np.min(steps, where=steps > 0, initial=np.max(steps)))
+    steps = np.diff(reference.time)[np.diff(reference.segment) == 0]
+    return float(np.min(steps[steps > 0], initial=np.max(steps, initial=0.0)))
 
 
 @eqx.filter_jit
-def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
-    """Force, position and velocity at every sample, each `(N,)`: one scan, compiled once."""
+def _integrate(model, actuator, controller, encoder, reference, key, initial, substeps, smooth):
+    """Force, position and velocity at every sample, and the set-point, each `(N,)`: one scan."""
+    held = _held(reference, controller, encoder, key, initial)
     plant = plant_of(model, smooth)
 
     def advance(state, now):
@@ -193,7 +196,7 @@ def _integrate(model, actuator, controller, encoder, held, substeps, smooth):
         return following, (force, measured, velocity)
 
     first = _fresh(plant, actuator, controller, encoder, jax.tree.map(lambda x: x[0], held))
-    return jax.lax.scan(advance, first, held)[1]
+    return jax.lax.scan(advance, first, held)[1], held.reference
 
 
 def _fresh(plant, actuator, controller, encoder, now):

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .. import signals
-from ..data.recording import Recording
+from ..data.recording import Recording, anonymous
 from ..models import Model
 from .memory import Augmented, holds
 from .plant import Plant, Surroundings, slowest
@@ -46,9 +46,13 @@ def default_substeps(
     return min(max(math.ceil(steps), 1), MOST_SUBSTEPS)
 
 
-@eqx.filter_jit
-def rates(model, reference, smooth):
+def rates(model, reference: Recording, smooth):
     """Inertia, ∂F/∂v and ∂F/∂x at states of the reference, each `(256, 2 speeds + 1)`."""
+    return _rates(model, anonymous(reference), smooth)
+
+
+@eqx.filter_jit
+def _rates(model, reference, smooth):
     dtype = reference.time.dtype
     axis = model.without("predicted_")
     model, smooth = cast((axis, None if smooth is None else jnp.asarray(smooth)), dtype)
