@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from ..identification.uncertainty import Estimate
-from ..terms.base import leaves
+from ..terms.base import AbstractTerm, leaves
 from ..terms.effect import PASSED
 from ..terms.effects import traits
 from ..terms.friction import AbstractBump
@@ -107,6 +107,26 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
         none = any(low <= 0 for low, _ in gone)
         if none or spelled.may_be_none(term, own[number], there[number]):
             yield number - start
+
+
+def told_parts(current: Fit, count: int, evidence: Evidence) -> Iterator[tuple[int, AbstractTerm]]:
+    """Of the last `count` terms those made of forces by themselves, isolated pushes, without the
+    forces whose told interval holds zero, where others are left: their numbers, and what is left.
+
+    A push has a moment and a size of its own, and one that may be none says nothing. What stood out
+    beside the base alone may not beside the larger ones, which bend the base.
+    """
+    start = len(current.terms) - count
+    if not any(traits(term).parts for term in current.terms[start:]):
+        return
+    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+    own = spelled.estimates(current, block, evidence.motion.unit_names)
+    for number, term in enumerate(current.terms[start:]):
+        intervals = [own[start + number][parameter.name].interval() for parameter in term.affine]
+        sure = [n for n, (low, high) in enumerate(intervals) if low * high > 0]
+        some = traits(term).parts
+        if some is not None and 0 < len(sure) < len(intervals):
+            yield number, some(term, sure)
 
 
 def _beside(finalist: Finalist, current: Fit, evidence: Evidence) -> tuple[Burden, Machine]:

@@ -5,12 +5,13 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import NamedTuple
 
+from ..terms.base import AbstractTerm
 from ..terms.effect import Effect
 from .acceptance import LEAST_SHARE, accepted, needed
 from .contest import RIVAL, Contest, Finalist, Trial, contest
 from .evidence import Evidence
 from .intervals import left_out, left_out_again
-from .physical_constraints import constrained, nil
+from .physical_constraints import constrained, nil, told_parts
 from .predictions import with_predictions
 from .problem import Problem
 from .regression import Fit, fit, without
@@ -101,6 +102,8 @@ def select(
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)
             current, evidence, selected = _less(evidence, current, selected, number)
+        for number, part in told_parts(current, len(selected), evidence):
+            current, evidence, selected = _instead(evidence, current, selected, number, part)
         if first and selected:
             break
     if in_slip is not None and len(selected) == known and selected:
@@ -211,3 +214,15 @@ def _less(
     """Without one of the selected terms."""
     less = without(current, evidence, len(current.terms) - len(selected) + number)
     return *_predicting(less, evidence), [*selected[:number], *selected[number + 1 :]]
+
+
+def _instead(
+    evidence: Evidence, current: Fit, selected: list[SelectedTerm], number: int, term: AbstractTerm
+) -> tuple[Fit, Evidence, list[SelectedTerm]]:
+    """With another term of as many nonlinear parameters in the place of a selected one."""
+    index = len(current.terms) - len(selected) + number
+    terms = (*current.terms[:index], term, *current.terms[index + 1 :])
+    own = selected[number]
+    trial = own.trial._replace(candidate=own.trial.candidate._replace(term=term))
+    selected = [*selected[:number], own._replace(trial=trial), *selected[number + 1 :]]
+    return *_predicting(fit(terms, evidence, current.betas), evidence), selected

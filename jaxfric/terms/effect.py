@@ -1,7 +1,7 @@
 """What is said of an effect: its laws, where it shows, how it is searched for and told."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -216,7 +216,8 @@ class Effect:
     - `waves`: of a law that is a wave, over what; `grid`: of another one the β to try, `(G, d)`.
     - `scatter`: further β of a law whose energy has minima between neighbours of such a grid, so
       many of them, `(G, d)`.
-    - `outstanding`: laws that the residual itself suggests.
+    - `outstanding`: laws that the residual itself suggests; `parts`: such a law of some of its
+      affine parameters alone, by their numbers, where each is a force by itself.
     - `undone`: the recording with the force where it belongs, for a force that is late by a time,
       s; `shift`: the parameter by which a prediction takes the force later, if by the whole of it.
     - `logged`: it is in the log alone, and what moves has none of it: a force is recorded late.
@@ -261,6 +262,7 @@ class Effect:
     grid: Callable[[Any, View], np.ndarray] = even
     scatter: Callable[[Any, View, int], np.ndarray] | None = None
     outstanding: Callable[[Residual], Iterator[AbstractTerm]] = _nothing
+    parts: Callable[[Any, Sequence[int]], AbstractTerm] | None = None
     undone: Callable[[Recording, float], Recording] | None = None
     shift: str = ""
     logged: bool = False

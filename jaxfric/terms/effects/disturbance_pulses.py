@@ -1,6 +1,6 @@
 """Isolated pushes, whose places the residual itself has to say."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import comb
 from typing import ClassVar
 
@@ -53,8 +53,9 @@ class DisturbancePulses(AbstractLaw):
 # Standard deviations that a push must stand out by: of ten thousand places, noise reaches five in
 # one record of two hundred.
 OUTSTANDING = 5.0
-# More pushes than this, or more of the time than that, are no isolated ones.
-MOST, LARGEST_PART = 12, 0.2
+# More pushes than this, or more of the time than that, are no isolated ones; but those are that
+# are twice as high, four times the power, as the first one too many.
+MOST, LARGEST_PART, APART_FROM_MANY = 12, 0.2, 2.0
 # A push is isolated if there is none of the other sign within its own breadth on either side, two
 # widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of
 # the encoder that come and go in the controller's velocity.
@@ -114,9 +115,13 @@ def _outstanding(residual, time, width, spacing) -> list[float]:
     spread = np.median(np.abs(height)) / 0.6745
     left = np.abs(height) / max(spread, 1e-300)
     found: list[tuple[float, float]] = []
+    sizes: list[float] = []
     while left[peak := int(np.argmax(left))] >= OUTSTANDING:
         if len(found) == MOST:
-            return []
+            many = APART_FROM_MANY * left[peak]
+            found = found[: sum(size >= many for size in sizes)]
+            break
+        sizes.append(left[peak])
         found.append((_summit(time, left, peak), float(np.sign(height[peak]))))
         left[max(0, peak - 2 * reach) : peak + 2 * reach + 1] = 0.0
     near = APART * (width + 2 * spacing)
@@ -136,6 +141,10 @@ def _summit(time, height, peak) -> float:
     bend = before - 2 * at + after
     share = 0.5 * (before - after) / bend if bend < 0 else 0.0
     return float(time[peak] + share * 0.5 * (time[peak + 1] - time[peak - 1]))
+
+
+def _some(term: DisturbancePulses, numbers: Sequence[int]) -> DisturbancePulses:
+    return DisturbancePulses(tuple(term.times[n] for n in numbers), term.width)
 
 
 def _dates(term: DisturbancePulses) -> dict[str, float]:
@@ -172,6 +181,7 @@ DISTURBANCE_PULSES = Effect(
     leftover=True,
     isolated=True,
     outstanding=pulses,
+    parts=_some,
     variant=listed,
     dates=_dates,
 )
