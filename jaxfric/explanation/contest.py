@@ -13,7 +13,7 @@ from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains
 from .scanning import scanned
-from .significance import DRAWS, LEVEL, BlockBootstrap, Scan, blocks, thresholds
+from .significance import DRAWS, LEVEL, NEW, BlockBootstrap, Scan, blocks, thresholds
 from .spectral_lines import fast_tone
 from .threads import each
 
@@ -200,8 +200,9 @@ def _finals(
         if bent and _imitated(trial, current):
             again = _afresh(seen, current, trial)
             found = again if found is None or again.energy < found.energy else found
-        if found is not None and _overshadowed(trial, found.alpha):
-            trial = _overtone(trial, found)
+        harmonics = None if found is None else _harmonics(found, seen, basis)
+        if harmonics is not None and harmonics[0] < 0.25 * harmonics.max():
+            trial = _overtone(trial, found, int(np.argmax(harmonics)))
             found = _refined(seen, current, field, trial, basis)
         return assessed(found)
 
@@ -252,22 +253,29 @@ def _changed(found: Finalist, seen: Evidence) -> bool:
     return bool(FIRST_ROWS <= before <= 1 - FIRST_ROWS)
 
 
-def _overshadowed(trial: Trial, alpha: np.ndarray) -> bool:
-    """Whether the first of several harmonics is a bystander: under a quarter of the strongest."""
-    if trial.candidate.lines is None or len(alpha) == 2:
-        return False
-    size = np.hypot(alpha[::2], alpha[1::2])
-    return bool(size[0] < 0.25 * size.max())
+def _harmonics(found: Finalist, seen: Evidence, basis: np.ndarray) -> np.ndarray | None:
+    """The sizes of a wave's several harmonics, N, `(H,)`; `None` for other laws.
+
+    Of a harmonic that the model has already, as one of a wave of twice the period, no size is
+    known; it counts as none.
+    """
+    candidate, alpha = found.trial.candidate, found.alpha
+    if candidate.lines is None or len(alpha) == 2:
+        return None
+    rows = seen.columns(candidate.term, found.betas[-1][None])[0]
+    own = rows - basis @ (basis.T @ rows)
+    new = np.sum(own**2, axis=0) > NEW**2 * np.sum(rows**2, axis=0)
+    alpha = np.where(new, alpha, 0.0)
+    return np.hypot(alpha[::2], alpha[1::2])
 
 
-def _overtone(trial: Trial, found: Finalist) -> Trial:
-    """The strongest harmonic as a wave of its own, to be believed from the threshold of them all.
+def _overtone(trial: Trial, found: Finalist, number: int) -> Trial:
+    """One harmonic as a wave of its own, to be believed from the threshold of them all.
 
     It may be finer than what is scanned for, and stand out only at the slowest rows.
     """
-    size = np.hypot(found.alpha[::2], found.alpha[1::2])
     candidate = trial.candidate
-    beta = found.betas[-1] / (1 + int(np.argmax(size)))
+    beta = found.betas[-1] / (1 + number)
     lines = candidate.lines._replace(harmonics=1)
     several: Any = candidate.term
     term = dataclasses.replace(several, harmonics=1)

@@ -1,12 +1,15 @@
 """Findings as they are reported: parameters with their errors, shares, sentences."""
 
+import math
+
 import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
-from . import verification
+from . import parameters as spelled, verification
+from .acceptance import OF_BASE
 from .baseline import Baseline
 from .dates import dated, spanning
 from .evidence import Evidence
@@ -14,11 +17,12 @@ from .finding import Finding, Moved
 from .findings import Findings
 from .improvement import Errors, Improved
 from .mismatch import Mismatch
-from .quantities import rise
+from .quantities import quantity, rise
 from .regression import Fit
 from .selection import SelectedTerm
 from .sentences import changed_sentence, mismatch_sentence, sentence, spoken
 from .uncertainty import estimated
+from .verdict import overlapping
 
 # What cannot be told from a force that acts late.
 NO_POSITION = (
@@ -26,6 +30,10 @@ NO_POSITION = (
     "recording the position tells."
 )
 ELSEWHERE = " The held-out recording does not go where it acts, and cannot confirm it."
+REST = (
+    " Its size is not known together with its shape, and it is little beside the other findings: "
+    "it may be what those have not quite the shape of."
+)
 REPHASED = (
     " On the held-out recording it has the same period and amplitude at another phase: the "
     "position's zero has moved, as after another homing."
@@ -36,19 +44,28 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
     """The findings, and the share of each beside all the others."""
     selection, evidence = findings.selection, findings.problem.evidence
     values = estimated(findings)[selection.term_index(0) :]
-    result, alone = [], []
+    every = [_shares(findings, first, number) for number in range(len(values))]
+    shares = [
+        _shares(_without(findings, twins), first, number) if twins else every[number]
+        for number, twins in enumerate(_twins(findings, n) for n in range(len(values)))
+    ]
+    removed = 1 - selection.last.energy / first.energy
+    together = removed if overlapping([share for share, _ in shares], removed) else None
+    result: list[Finding] = []
     for number, (selected, parameters) in enumerate(zip(selection.selected, values, strict=True)):
-        effect = selected.effect
+        effect, (share, held) = selected.effect, shares[number]
+        term = selection.last.terms[selection.term_index(number)]
+        small = len(values) > 1 and share < OF_BASE
+        rest = small and spelled.may_be_none(term, parameters, as_told=True)
         if effect.moment:
             parameters = dated(parameters, effect.moment, evidence)
             parameters = spanning(parameters, findings, number)
         parameters = parameters | _dates(effect, findings, number)
-        share, held = _shares(findings, first, number)
-        alone.append(share)
-        if twins := _twins(findings, number):
-            share, held = _shares(_without(findings, twins), first, number)
         rivals = *selected.rivals, *map(spoken, selected.instead)
-        text = sentence(effect.name, parameters, share, rivals, _extent(evidence))
+        text = sentence(effect.name, parameters, share, rivals, _extent(evidence), together)
+        text += _overtone(effect, parameters, result)
+        if rest:
+            text += REST
         if selected.rephased:
             text += REPHASED
         unheard = selected.confirmed is None and not effect.momentary
@@ -63,7 +80,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
                 instead=_instead(selected),
             )
         )  # fmt: skip
-    return result, alone
+    return result, [share for share, _ in every]
 
 
 def _instead(selected: SelectedTerm) -> dict[str, tuple[str, ...]]:
@@ -137,7 +154,8 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
             moved[names[i]] = Moved(before, current, float(errors[i]))
     first = better.first
     held_share = None if held is None else verification.share(first, base, first, held)
-    text = mismatch_sentence(moved, wrong.share, wrong.rivals)
+    kept = [names[i] for i, value in enumerate(base.alphas[0]) if value and i not in wrong.moved]
+    text = mismatch_sentence(moved, wrong.share, wrong.rivals, kept)
     if known.fit is not None:
         other = known.name.removeprefix("recording ")
         text = changed_sentence(moved, wrong.share, other, wrong.rivals)
@@ -147,6 +165,21 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
         MISMATCH, PARAMETER_MISMATCH.equation, text, wrong.rivals, separate_by, moved,
         wrong.share, held_share, wrong.p_value, instead=instead,
     )  # fmt: skip
+
+
+def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Finding]) -> str:
+    """That a wave is a harmonic of an earlier finding of the same effect, by the errors of both
+    periods, in words.
+    """
+    for earlier in before:
+        for name in effect.periods if earlier.effect == effect.name else ():
+            first, own = earlier.parameters[name], parameters[name]
+            ratio = float(first.value) / float(own.value)
+            error = math.hypot(*(float(p.half_width() / p.value) for p in (first, own)))
+            if round(ratio) > 1 and abs(ratio / round(ratio) - 1) <= error < 0.5 / ratio:
+                whole = f"1/{round(ratio)} of the period of {quantity(first)}"
+                return f" That is {whole}: a harmonic of the same cause."
+    return ""
 
 
 def _twins(findings: Findings, number: int) -> list[int]:

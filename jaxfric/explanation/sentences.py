@@ -22,10 +22,12 @@ def sentence(
     share: float,
     rivals,
     extent: Extent = NOWHERE,
+    together: float | None = None,
 ) -> str:
     """One finding as a sentence, with its share and what it could be instead.
 
-    **Arguments:** `name` of the effect; `extent` of the recording, which some sentences depend on.
+    **Arguments:** `name` of the effect; `extent` of the recording, which some sentences depend on;
+    `together`: the share of all findings, where others could stand in for a part of this one.
     """
     effect = EFFECTS[name]
     values = {n: float(estimate.value) for n, estimate in parameters.items()}
@@ -33,7 +35,8 @@ def sentence(
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     text = re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
-    return f"{text}; {unexplained(share)}{indistinct(rivals)}."
+    all_ = "" if together is None else f" alone, {together:.0%} with the other findings"
+    return f"{text}; {unexplained(share)}{all_}{indistinct(rivals)}."
 
 
 def unexplained(share: float) -> str:
@@ -67,8 +70,13 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     return quantity(estimate)
 
 
-def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
-    """Wrong values of the baseline as a sentence."""
+def mismatch_sentence(
+    moved, share: float, rivals: Sequence[str] = (), kept: Sequence[str] = ()
+) -> str:
+    """Wrong values of the baseline as a sentence; `kept`: names of forces that are right.
+
+    A force that is counted otherwise would change these as well.
+    """
     parts = []
     for name, m in moved.items():
         if name == GAIN and not m.before:
@@ -78,7 +86,8 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
         else:
             value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    text = f"Wrong values: {'; '.join(parts)}{_alike(moved)}; {unexplained(share)}"
+    alike = "" if kept else _alike(moved)
+    text = f"Wrong values: {'; '.join(parts)}{alike}; {unexplained(share)}"
     return f"{text}{indistinct(rivals)}."
 
 

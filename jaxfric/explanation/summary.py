@@ -27,7 +27,7 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
-from .wording import CONSTANT_APART, ELSEWHERE, constant_apart
+from .wording import CONSTANT_APART, ELSEWHERE, OTHER, constant_apart
 
 
 def summarise(
@@ -199,10 +199,15 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
     )
     if constant := constant_apart(errors):
         text += f"a constant force of {constant} more acts there. {CONSTANT_APART}"
-    else:
+    elif held["after"] > OTHER:
         text += (
             "it is of another axis, in other units or of another sign, or this recording does not "
             "determine the values that hold there."
+        )
+    else:
+        text += (
+            "other values hold there. The machine has changed, or this recording does not "
+            "determine them: identify on one that moves like both."
         )
     return [Remark("holdout_differs", text, False)]
 

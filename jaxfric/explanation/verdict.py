@@ -97,8 +97,12 @@ def stand_ins(alone: list[float], removed: float) -> bool:
 
     `alone`: what each removes beside all the others.
     """
-    claimed = sum(max(share, 0.0) for share in alone)
-    return len(alone) >= STAND_INS and claimed < CLAIMED * removed
+    return len(alone) >= STAND_INS and overlapping(alone, removed)
+
+
+def overlapping(alone: list[float], removed: float) -> bool:
+    """Whether what each of several findings removes beside the others does not add up to it all."""
+    return len(alone) > 1 and sum(max(share, 0.0) for share in alone) < CLAIMED * removed
 
 
 def verdict_of(

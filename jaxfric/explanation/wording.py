@@ -137,6 +137,8 @@ def adjusted(fit: Mapping[str, Any]) -> str:
 # Other values of the same model leave less than half of a held-out recording's error, a quarter of
 # its power: then most of it is not physics that the model lacks.
 ELSEWHERE = 2.0
+# A held-out recording that is left with more than half of its force is hardly of the same machine.
+OTHER = 0.5
 
 
 def _found_of(fit: Mapping[str, Any]) -> float:

@@ -107,9 +107,8 @@ def simulate(
     model, actuator = faults.parted(model, _shortest(model, reference))
     smooth = None if smooth is None else jnp.asarray(smooth, reference.time.dtype)
     parts = model, actuator, controller, encoder
-    if initial is not None:
-        initial = tuple(jnp.asarray(each, reference.time.dtype) for each in initial)
-    given = anonymous(reference), encoder_key, initial
+    begin = jax.tree.map(lambda x: jnp.asarray(x, reference.time.dtype), initial)
+    given = anonymous(reference), encoder_key, begin
     (force, position, velocity), goal = _integrate(*parts, *given, substeps, smooth)
     if force_key is not None:
         noise = jax.random.normal(force_key, force.shape, force.dtype)

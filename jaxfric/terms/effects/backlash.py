@@ -278,9 +278,9 @@ BACKLASH = Effect(
     scatter=flights,
     variant=with_parameter(
         "load_deceleration",
-        "A load with {backlash_force} of friction crosses a gap of twice {half_gap} after a "
-        "reversal, and where the motor brakes harder than the load slows down by itself, by "
-        "{load_deceleration}: backlash",
+        "A load with {backlash_force} of friction crosses a gap of twice {half_gap}, whose flanks "
+        "give way by {windup} under that friction, after a reversal, and where the motor brakes "
+        "harder than the load slows down by itself, by {load_deceleration}: backlash",
     ),
     sizes=("backlash_force",),
     vanishes=("half_gap",),

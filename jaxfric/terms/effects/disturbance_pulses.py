@@ -54,8 +54,8 @@ class DisturbancePulses(AbstractLaw):
 # one record of two hundred.
 OUTSTANDING = 5.0
 # More pushes than this, or more of the time than that, are no isolated ones; but those are that
-# are twice as high, four times the power, as the first one too many.
-MOST, LARGEST_PART, APART_FROM_MANY = 12, 0.2, 2.0
+# are four times as high as the first one too many: one of the many would not reach so far.
+MOST, LARGEST_PART, APART_FROM_MANY = 12, 0.2, 4.0
 # A push is isolated if there is none of the other sign within its own breadth on either side, two
 # widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of
 # the encoder that come and go in the controller's velocity.

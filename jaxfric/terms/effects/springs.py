@@ -1,13 +1,15 @@
 """Springs along the stroke."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...units import POSITION, STIFFNESS, Dimension
 from ..base import AbstractLaw
-from ..effect import Effect
+from ..effect import Effect, Extent
 from ..position import POSITION_ONLY, within
 from ..sample import UNKNOWN, Parameter, Sample
 from ..text import signed
@@ -17,7 +19,8 @@ class Spring(AbstractLaw):
     """Linear spring: F = k (x − x₀).
 
     `rest` x₀, m, is a given number: moving it adds a constant, which the offset or the two
-    Coulomb levels take up. A place inside the stroke keeps that constant small.
+    Coulomb levels take up. A place inside the stroke keeps that constant small: the position's
+    zero, if it is there.
     """
 
     rest: float = eqx.field(static=True, default=0.0)
@@ -51,13 +54,23 @@ class HardeningSpring(AbstractLaw):
         return (f"{away} * {away} * {away}",)
 
 
+def _from_an_end(values: Mapping[str, float], extent: Extent) -> str | None:
+    if extent.low <= 0 <= extent.high:
+        return None
+    return (
+        "A force proportional to the distance from the end of the stroke that is nearest to zero, "
+        "{stiffness}: a spring"
+    )
+
+
 SPRING = Effect(
     "spring",
     "k (x − x₀)",
     "position",
     "A force proportional to position, {stiffness}: a spring",
+    variant=_from_an_end,
     laws=(Spring,),
-    scaled=lambda scales: (Spring(float(0.5 * (scales.low + scales.high))),),
+    scaled=lambda scales: (Spring(float(np.clip(0.0, scales.low, scales.high))),),
     coordinates=("position",),
     needs=frozenset({"position"}),
     confusable_with=("gravity_unbalance", "hardening_spring", "end_stop"),
