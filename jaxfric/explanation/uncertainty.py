@@ -87,10 +87,13 @@ def by_rows(
         wide = [own if through >= PASSES * all_of_it else None for own, through, all_of_it in pairs]
     there: dict[int, dict[str, Estimate]] = {}
     if problem.held is not None:
-        # A moment's parameters are its recording's own, and so is the phase of an encoder's zero.
-        lasting = verification.lasting(others.last, others.rephased)
-        values = spelled.estimates(*again(problem.held, lasting), units)
-        there = {id(term): each for term, each in zip(lasting.terms, values, strict=True)}
+        # A moment's parameters are its recording's own, and so is the phase of an encoder's zero;
+        # but an axis that warms does so there as well, and without that its friction is another.
+        lasting = verification.lasting(others.last, others.rephased).terms
+        known = others.last.only([n for n in range(count) if n not in others.rephased])
+        values = spelled.estimates(*again(problem.held, known), units)
+        pairs_there = zip(known.terms, values, strict=True)
+        there = {id(t): each for t, each in pairs_there if any(t is term for term in lasting)}
     both = zip_longest(ours[:count], wide, map(there.get, map(id, others.last.terms)))
     return [Estimates(*each) for each in both] + [Estimates(each) for each in late]
 
