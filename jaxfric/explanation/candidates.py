@@ -9,7 +9,7 @@ import jax
 import numpy as np
 
 from ..data.recording import Recording
-from ..terms import KNOWN_FORCE
+from ..terms import KNOWN_FORCE, KNOWN_FRICTION
 from ..terms.actuator import REACTION
 from ..terms.base import AbstractTerm, leaves
 from ..terms.effect import Effect, View, inside
@@ -181,7 +181,8 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
     """Every term of every effect that this recording has the signals for."""
     seen = view(evidence)
     have = {"predicted_force", *evidence.motion.channels}
-    if KNOWN_FORCE not in have:  # another simulator's force is not told apart
+    # Of another program's force it has to be known what of it is friction.
+    if KNOWN_FORCE not in have or KNOWN_FRICTION in have:
         have.add(REACTION)
     if evidence.motion.position is not None:
         have.add("position")

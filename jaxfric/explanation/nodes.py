@@ -8,7 +8,14 @@ import numpy as np
 from .. import signals
 from ..data.recording import Recording
 from ..data.shifting import shifted
-from ..terms import KNOWN_FEEDBACK, KNOWN_FORCE, KNOWN_MASKED, KNOWN_REST, at_other_times
+from ..terms import (
+    KNOWN_FEEDBACK,
+    KNOWN_FORCE,
+    KNOWN_FRICTION,
+    KNOWN_MASKED,
+    KNOWN_REST,
+    at_other_times,
+)
 from ..terms.sample import Scales
 from .motion import moves, padded_length
 
@@ -70,7 +77,8 @@ def node_signals(
     # and the columns' weights take it off again, so that force and columns are averaged alike. So
     # is what the derivative took off the velocity, which would look like a load on a spring.
     inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    forces = {"force", *(f"channel {n}" for n in (KNOWN_FORCE, KNOWN_REST, KNOWN_FEEDBACK))}
+    known = KNOWN_FORCE, KNOWN_FRICTION, KNOWN_REST, KNOWN_FEEDBACK
+    forces = {"force", *(f"channel {n}" for n in known)}
     for name in set(means) - forces - {"time", "elapsed"}:
         values = means[name]
         bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]

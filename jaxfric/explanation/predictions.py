@@ -3,8 +3,7 @@
 import numpy as np
 
 from ..signals import kernel_slope
-from ..terms import KNOWN_FORCE
-from ..terms.actuator import carried
+from ..terms import KNOWN_FORCE, KNOWN_FRICTION
 from ..terms.base import summands
 from ..terms.effects import traits
 from .evaluation import evaluate, sizes
@@ -28,7 +27,7 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
         plain, moving = evaluate(
             term, np.repeat(beta[None], sizes(term)[0], axis=0), evidence.read_by(term)
         )
-        borne = alpha * [carried(part) for part in summands(term) for _ in part.affine]
+        borne = alpha * [not own for part in summands(term) for own in part.frictional]
         force = force + alpha @ np.asarray(plain)[0]
         reaction = reaction + borne @ np.asarray(plain)[0]
         if moving is not None:
@@ -37,7 +36,9 @@ def with_predictions(evidence: Evidence, fit: Fit) -> Evidence:
     force = force + rate(evidence, momentum)
     reaction = reaction + rate(evidence, moved)
     if KNOWN_FORCE in evidence.motion.channels:
-        force = force + np.asarray(evidence.motion.channels[KNOWN_FORCE])
+        known = np.asarray(evidence.motion.channels[KNOWN_FORCE])
+        force = force + known
+        reaction = reaction + known - np.asarray(evidence.motion.channels.get(KNOWN_FRICTION, 0.0))
     if any(traits(term).switches for term in fit.terms):
         force = _crossing(force, np.asarray(evidence.motion.force))
     return evidence.with_channels(

@@ -9,7 +9,7 @@ from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
-from ..terms.actuator import REACTION, carried
+from ..terms.actuator import REACTION
 from ..terms.base import AbstractTerm, summands
 
 Scalar = Float[Array, ""]
@@ -51,7 +51,7 @@ class Plant(eqx.Module):
         """
         if self.reaction is None:
             return left
-        still = [carried(term) for term in summands(self.model.term) for _ in term.affine]
+        still = [not own for term in summands(self.model.term) for own in term.frictional]
         motion = rest.motion(position, velocity)
         sizes = jnp.where(jnp.asarray(still), self.model.alpha, 0.0)
         borne = drift + self.model.term.columns(motion) @ sizes

@@ -15,7 +15,7 @@ from .. import programs, signals
 from ..data.excerpt import MOST, SPARE, excerpt, pieces
 from ..data.recording import Recording, pad, require, uniform
 from ..models import Model, require as require_model, weighed
-from ..terms import at_other_times
+from ..terms import KNOWN_FRICTION, at_other_times
 from ..terms.actuator import PREDICTED, REACTION, carried
 from ..terms.base import AbstractLaw, AbstractTerm, Directional, summands
 from ..terms.presliding import AbstractStates, starts
@@ -301,6 +301,14 @@ def with_channels(model: Model, recording: Recording) -> Recording:
         if name == REACTION and not any(map(carried, summands(sound.term))):
             channels[name] = jnp.zeros_like(recording.time)
             continue
-        part = sound if name == PREDICTED else sound.only(carried)
-        channels[name] = part.force(recording) + _by_kernel(recording, part.momentum(recording))
+        part = sound if name == PREDICTED else _borne(sound)
+        force = part.force(recording) + _by_kernel(recording, part.momentum(recording))
+        known = recording.channels.get(KNOWN_FRICTION) if name == REACTION else None
+        channels[name] = force if known is None else force - known
     return dataclasses.replace(recording, channels=channels)
+
+
+def _borne(model: Model) -> Model:
+    """The model of what guide and screw carry: without the friction in it."""
+    own = [own for term in summands(model.term) for own in term.frictional]
+    return dataclasses.replace(model, alpha=jnp.where(jnp.asarray(own), 0.0, model.alpha))

@@ -14,6 +14,7 @@ from .. import signals
 from ..data.recording import Recording
 from ..models import Model
 from ..terms import (
+    KNOWN_FRICTION,
     KNOWN_MASKED,
     KNOWN_MOMENTUM,
     KNOWN_REST,
@@ -143,6 +144,8 @@ class Mujoco(AbstractSimulator):
         """The force, NaN where nothing is compared, and what stands beside it by channel."""
         seen, own = self.along(recording), self.number
         found = {KNOWN_REST: seen.rest[:, own], KNOWN_MOMENTUM: seen.momentum[:, own]}
+        damped = float(self.model.dof_damping[own]) * seen.motion.velocity[:, own]
+        found[KNOWN_FRICTION] = seen.friction[:, own] + damped
         time = np.asarray(recording.time, float)
         for number, parts in enumerate(self.columns.along(seen, time)):
             found |= dict(zip(channels_of(number), parts, strict=True))

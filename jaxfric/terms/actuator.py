@@ -19,7 +19,5 @@ def predicted(term: AbstractTerm) -> bool:
 
 
 def carried(term: AbstractTerm) -> bool:
-    """Whether guide or screw carry the force of a term: inertia, weight, a spring; not friction,
-    which is a function of the velocity.
-    """
-    return "velocity" not in term.coordinates or "acceleration" in term.coordinates
+    """Whether guide or screw carry something of a term: not where all of it is friction."""
+    return not (term.affine and all(term.frictional))

@@ -82,6 +82,14 @@ class AbstractTerm(eqx.Module):
         """Whether the term has momentum, so that its force contains an acceleration."""
         return False
 
+    @property
+    def frictional(self) -> tuple[bool, ...]:
+        """Which affine parameters are of friction, a function of the velocity, one for each; what
+        guide or screw carry is the others: inertia, weight, springs.
+        """
+        slips = "velocity" in self.coordinates and "acceleration" not in self.coordinates
+        return (slips,) * len(self.affine)
+
     def text(self, s: Syntax, *names: str) -> Sequence[str] | None:
         """Its columns at one sample in a language, `names` being those of β; `None` for no text.
 

@@ -24,6 +24,8 @@ KNOWN_FEEDBACK = "known_feedback"
 # One where a simulator's force alone says nothing and the motion is known, else zero: what has a
 # memory goes on there.
 KNOWN_MASKED = "known_masked"
+# The part of it that is the simulator's own friction, N: guide and screw carry the rest.
+KNOWN_FRICTION = "known_friction"
 # Channels that begin so belong to a simulator.
 KNOWN = "known_"
 
@@ -78,7 +80,8 @@ class KnownColumns(AbstractLaw):
 
     **Arguments:** `names` of the parameters, and their units as they are `spelled`. Recordings
     bring the derivatives as the channels of `channels_of`, in two parts as the force, from the
-    number `first` on.
+    number `first` on. Friction among them counts as carried, not `frictional`: before it is known
+    which values are wrong, those of friction and of bodies may cancel each other.
     """
 
     names: tuple[str, ...] = eqx.field(static=True, converter=tuple)
