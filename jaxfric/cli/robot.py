@@ -11,6 +11,7 @@ from ..data.targets import standard
 from ..explanation import Explanation
 from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..explanation.springs import DOUBTED
+from ..explanation.wording import HOLDS_MORE
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -141,8 +142,8 @@ def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
 
 
 def _severe(told: Explanation) -> list[str]:
-    """What nothing can be named beside."""
-    return [each["text"] for each in told.warnings if each["severe"]]
+    """What nothing can be named beside, and that the other recording holds more."""
+    return [w["text"] for w in told.warnings if w["severe"] or w["name"] == HOLDS_MORE]
 
 
 def _said(finding) -> str:

@@ -27,7 +27,7 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
-from .wording import CONSTANT_APART, ELSEWHERE, OTHER, constant_apart
+from .wording import CONSTANT_APART, ELSEWHERE, HOLDS_MORE, OTHER, constant_apart
 
 
 def summarise(
@@ -183,16 +183,25 @@ def _doubts(better: Improved) -> list[Remark]:
 
 
 def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
-    """That the held-out recording obeys other values of the same model, where that matters.
+    """That the held-out recording obeys other values of the same model, or holds something that no
+    values account for and that is not here, where that matters.
 
     Less is told in the summary alone.
     """
-    held = errors["filtered_holdout_force_error"]
+    here, held = errors["filtered_force_error"], errors["filtered_holdout_force_error"]
     refitted = errors["filtered_holdout_refitted_error"]
-    if refitted is None or not held["after"] > ELSEWHERE * refitted:
+    if refitted is None:
         return []
-    if held["after"] ** 2 - refitted**2 < MATTERS**2:
-        return []
+    if held["after"] ** 2 - refitted**2 < MATTERS**2 or not held["after"] > ELSEWHERE * refitted:
+        more = held["after"] ** 2 - here["after"] ** 2 >= MATTERS**2
+        if not more or not refitted > ELSEWHERE * here["after"]:
+            return []
+        text = (
+            f"The held-out recording is left with {held['after']:.1%} of its force, whatever the "
+            f"values, and this one with {here['after']:.1%}: something acts there that does not "
+            "act here, or not as much. Explain that one, with this one held out."
+        )
+        return [Remark(HOLDS_MORE, text, False)]
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "
         f"{refitted:.0%} where the model is fitted to it: "

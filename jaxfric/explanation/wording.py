@@ -139,6 +139,8 @@ def adjusted(fit: Mapping[str, Any]) -> str:
 ELSEWHERE = 2.0
 # A held-out recording that is left with more than half of its force is hardly of the same machine.
 OTHER = 0.5
+# The warning of one in which something acts that does not act in the recording itself.
+HOLDS_MORE = "holdout_holds_more"
 
 
 def _found_of(fit: Mapping[str, Any]) -> float:
