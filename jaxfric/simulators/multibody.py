@@ -180,6 +180,25 @@ class Mujoco(AbstractSimulator):
             found |= dict(zip(force_channels(*named), parts, strict=True))
         return found
 
+    def turns_all(self, name: str) -> bool:
+        """Whether a joint is a hinge by which all that the model moves turns: then its zero and a
+        tilt of the base about its axis are one.
+        """
+        first = self.joints.index(name)
+        top = int(self.model.jnt_bodyid[first])
+
+        def below(body: int) -> bool:
+            while body not in (0, top):
+                body = int(self.model.body_parentid[body])
+            return body == top
+
+        own = int(self.model.body_jntadr[top]) == first
+        return (
+            own
+            and is_hinge(self.mujoco, self.model, first)
+            and all(map(below, self.model.jnt_bodyid))
+        )
+
     def limited(self, recording: Recording) -> Bool[np.ndarray, " N"]:
         """Where the joint is at a limit of the model, `(N,)`."""
         place = self.along(recording).motion.position[:, self.number]

@@ -143,6 +143,11 @@ def _zeros(part: Part, seen: FaultSearch) -> list[Check]:
             error = seen.faults.errors.get(name, error)
             own = Estimate(np.float64(zero), np.float64(error), unit)
             text = f"The encoder's zero of joint {joint} is at {quantity(own)} of the simulator's."
+            if part.simulator.turns_all(joint):
+                text += (
+                    " A base that is tilted about its axis by as much the other way looks the "
+                    "same, and both together by their sum: measure the one or the other."
+                )
             found.append(
                 Check(POSITION_ZERO.name, text, True, False, own, f"{joint} zero", attribute)
             )
