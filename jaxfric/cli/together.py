@@ -71,15 +71,15 @@ def clearly_more(new: Joint, own: Joint) -> bool:
 
 def _of_bodies(joint: Joint) -> list[str]:
     """The values of bodies that a joint by itself finds wrong."""
-    return [key for key in _wrong(joint) if key.startswith("body/")]
+    return [key for key in wrong(joint) if key.startswith("body/")]
 
 
 def shared(joint: Joint) -> set[str]:
     """The values of bodies and of gravity that a joint's answer has wrong."""
-    return {key for key in _wrong(joint) if key.startswith(SHARED)}
+    return {key for key in wrong(joint) if key.startswith(SHARED)}
 
 
-def _wrong(joint: Joint) -> set[str]:
+def wrong(joint: Joint) -> set[str]:
     """The values that a joint by itself finds wrong, those that it cannot tell too."""
     findings = joint.told.findings if joint.told else []
     return {key for f in findings if f.effect == MISMATCH for key in (*f.parameters, *f.untold)}
@@ -90,7 +90,7 @@ def _as_a_weight(joint: Joint) -> bool:
     force, a spring, a force that follows the position.
     """
     findings = joint.told.findings if joint.told else []
-    names = {key.split("/")[-1] for key in _wrong(joint)}
+    names = {key.split("/")[-1] for key in wrong(joint)}
     places = {EFFECTS[f.effect].family for f in findings if f.effect in EFFECTS}
     return bool(names & {CONSTANT, "stiffness", "springref"}) or "position" in places
 

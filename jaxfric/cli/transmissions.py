@@ -14,7 +14,7 @@ from ..simulators.loading import library
 from ..simulators.patching import folder_of, patched
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .robot_joints import Joint
-from .together import clearly_more, shared
+from .together import clearly_more, shared, wrong
 
 
 class Answer(NamedTuple):
@@ -51,7 +51,9 @@ def with_springs(
     if _worse(again.joints, answer.joints):
         return answer
     if not _better(again.joints, answer.joints):
-        return _doubted(answer, found.rivalled()) if found.share >= HALF else answer
+        # Beside a spring that does next to nothing the same values are wrong.
+        doubtful = found.share >= HALF and not _values(answer) <= _values(again)
+        return _doubted(answer, found.rivalled()) if doubtful else answer
     if (other := _once_more(again, found, text, arguments)) is not None:
         again = _with_spring(answer, other, text, explained, arguments)
     if again.open:
@@ -87,6 +89,11 @@ def _doubted(answer: Answer, doubt: Suspicion) -> Answer:
         for j in answer.joints
     ]
     return answer._replace(joints=joints)
+
+
+def _values(answer: Answer) -> set[tuple[str, str]]:
+    """The simulator's values that are wrong, by the joints that say so."""
+    return {(joint.name, key) for joint in answer.joints for key in wrong(joint)}
 
 
 def _with_spring(
