@@ -75,6 +75,16 @@ def test_a_stop_is_found_at_its_place_on_its_side(way, unit):
     assert contact.share > 0.9
 
 
+def test_a_place_that_the_axis_passes_at_other_times_blocks_nothing():
+    position, _ = driven()
+    position = np.concatenate([position, position[::-1]])[::2]  # there twice
+    known, place = needed(position), position.max() - 0.02
+    excess = np.where(position > place, 300 * (position - place), 0.0)
+    (contact,) = contacts(log(position, known + excess, known))
+    assert contact.upper and abs(contact.place.value - place) < 0.01
+    assert contacts(log(position, known + np.where(TIME < 8, excess, 0.0), known)) == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("sharp", [False, True])
 @pytest.mark.parametrize(

@@ -939,6 +939,59 @@ def test_a_push_is_alone_and_seen_from_begin_to_end():
     assert found((0.02, 1), (12.0, -1), (19.98, 1)) == pytest.approx([12.0], abs=0.01)
 
 
+def test_a_knock_stands_out_of_many_things_that_are_no_pushes():
+    time = 0.01 * np.arange(4000)
+    values = np.random.default_rng(0).normal(size=time.size)
+    for number, at in enumerate(1.0 + 2.0 * np.arange(19)):
+        size = 300.0 if number == 7 else 20.0
+        values += size * np.cos(np.clip((time - at) / 0.05, -1, 1) * np.pi / 2) ** 2
+    found = disturbance_pulses._outstanding(values, time, 0.05, 0.01)
+    assert found == pytest.approx([15.0], abs=0.01)
+    values -= 200.0 * np.cos(np.clip((time - 15.0) / 0.05, -1, 1) * np.pi / 2) ** 2
+    assert disturbance_pulses._outstanding(values, time, 0.05, 0.01) == pytest.approx(
+        [15.0], abs=0.01
+    )
+    values -= 60.0 * np.cos(np.clip((time - 15.0) / 0.05, -1, 1) * np.pi / 2) ** 2
+    assert disturbance_pulses._outstanding(values, time, 0.05, 0.01) == []
+
+
+def test_a_push_that_may_be_none_is_not_told_beside_one_that_is_not(healthy):
+    run = planted(healthy[0], terms.DisturbancePulses((6.3,), 0.15), (8.0,))
+    posed = problem.problem_of(run, models.named("gaussian"))
+    found = beside(posed, terms.DisturbancePulses((6.3, 9.1, 12.0), 0.15)).last
+    ((number, part),) = physical_constraints.told_parts(found, 1, posed.evidence)
+    assert number == 0 and part == terms.DisturbancePulses((6.3,), 0.15)
+    # The largest stays, whatever it is.
+    alone = beside(posed, part).last
+    assert list(physical_constraints.told_parts(alone, 1, posed.evidence)) == []
+
+
+@pytest.mark.slow
+def test_one_knock_is_told_with_its_moment(healthy):
+    speed = np.abs(np.gradient(np.asarray(healthy[0].position), TIME))
+    moment = float(TIME[np.argmax(np.where(np.abs(TIME - 8) < 4, speed, 0.0))])  # not at a reversal
+    run = planted(healthy[0], terms.DisturbancePulses((moment,), 0.06), (20.0,))
+    told = explain(run, "gaussian", healthy[1])
+    assert [f.effect for f in told.findings] == ["disturbance_pulses"]
+    values = told.findings[0].parameters
+    largest = max((n for n in values if f"{n}_time" in values), key=lambda n: abs(values[n].value))
+    assert abs(float(values[f"{largest}_time"].value) - moment) < 0.01
+    assert float(values[largest].value) == pytest.approx(20.0, rel=0.2)
+
+
+def test_a_harmonic_that_the_model_has_already_is_no_size_of_another_wave(healthy):
+    """What is periodic in 12 mm is periodic in 24 mm, too."""
+    run = planted(healthy[0], terms.Cogging(harmonics=2), (3.0, 1.0, 1.0, 2.0), (0.024,))
+    run = planted(run, terms.Cogging(), (1.5, 0.0), (0.006,))
+    posed = problem.problem_of(run, models.named("gaussian"))
+    found = beside(posed, terms.Cogging(harmonics=2).with_beta(np.array([0.024]))).last
+    seen = predictions.with_predictions(posed.evidence, found)
+    best = contest.contest(seen, found, posed.candidate_set).finalists[0]
+    assert best.trial.candidate.effect.name == "cogging"
+    assert best.trial.candidate.term.harmonics == 1
+    np.testing.assert_allclose(best.betas[-1], 0.006, rtol=0.005)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("periods", [0.7, 1.4, 1.9])
 def test_a_load_that_comes_and_goes_once_is_a_drift(healthy, periods):

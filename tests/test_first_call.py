@@ -1,5 +1,7 @@
 """What Python's first call compiles, and what later ones do not."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
@@ -102,3 +104,16 @@ def test_a_session_over_recordings_of_any_length_stays_bounded():
         for n in np.geomspace(2, 500_000, 100).astype(int)
     }
     assert len(lengths) < 20
+
+
+def test_a_simulation_is_one_program_whatever_the_set_point_is_called(lowered):
+    model = jf.models.from_parameters(
+        jf.models.coulomb_viscous(),
+        {"inertia": 2.0, "coulomb+": 5.0, "coulomb-": 5.0, "viscous+": 3.0, "viscous-": 3.0},
+    )
+    loop = jf.PD(kp=4000.0, kd=200.0)
+    goals = [dataclasses.replace(log(2500, number), velocity=None) for number in (0, 4)]
+    jf.simulate(model, goals[0], loop)
+    lowered.clear()
+    jf.simulate(model, dataclasses.replace(goals[1], units=goals[0].units), loop)
+    assert lowered == []

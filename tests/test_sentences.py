@@ -5,11 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from jaxfric.explanation.finding import Moved
+from jaxfric.explanation import reported, summary
+from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
 from jaxfric.explanation.sentences import mismatch_sentence, sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effect import Extent
+from jaxfric.terms.effects import EFFECTS
 
 
 def estimate(value, error, unit):
@@ -163,3 +165,61 @@ def test_pushes_are_told_with_their_times_and_sizes():
     begin = "Isolated pushes at single times: 2.00 N ± 0.20 N at t = 1.000 s ± 0.020 s, -7.00 N ±"
     assert text.startswith(begin) and "0.50 N" not in text
     assert text.endswith("at t = 7.000 s ± 0.020 s, and 1 smaller; 90% of the unexplained force.")
+
+
+def test_a_share_that_others_could_stand_in_for_is_told_with_theirs():
+    values = {"stiffness": estimate(40.0, 0.1, "N/m")}
+    alone = sentence("spring", values, 0.01, (), together=0.98)
+    assert alone.endswith("1% of the unexplained force alone, 98% with the other findings.")
+
+
+def test_a_spring_away_from_the_zero_of_the_position_is_told_from_an_end():
+    values = {"stiffness": estimate(40.0, 0.1, "N/m")}
+    assert "proportional to position," in sentence("spring", values, 1.0, (), Extent(-0.1, 0.2))
+    assert "from the end of the stroke" in sentence("spring", values, 1.0, (), Extent(0.1, 0.2))
+
+
+def test_flanks_that_give_way_by_more_than_the_gap_are_told():
+    names = "backlash_force half_gap windup load_deceleration viscous_speed load_asymmetry".split()
+    values = dict(zip(names, (10.0, 1.5e-6, 6.4e-5, 7.8, 0.03, 0.0), strict=True))
+    units = dict(zip(names, ("N", "m", "m", "m/s²", "m/s", "1"), strict=True))
+    known = {n: estimate(v, 1e-3 * abs(v), units[n]) for n, v in values.items()}
+    assert "whose flanks give way by 64.00 µm" in sentence("backlash", known, 1.0, ())
+
+
+def test_one_factor_for_all_values_is_told_only_where_all_have_changed():
+    moved = {
+        name: Moved(before, estimate(1.4 * before, 0.001 * before, "N·s/m"))
+        for name, before in (("viscous+", 30.0), ("viscous-", 28.0))
+    }
+    assert "1.4000 ± 0.0014 times what they were" in mismatch_sentence(moved, 1.0)
+    assert "times" not in mismatch_sentence(moved, 1.0, (), ["coulomb+", "inertia"])
+
+
+@pytest.mark.parametrize(("period", "told"), [(0.006, "1/4 of the period of 24 mm"), (0.0057, "")])
+def test_a_wave_that_is_a_harmonic_of_another_one_says_so(period, told):
+    first = {"pitch": estimate(0.024, 1e-6, "m")}
+    earlier = Finding("cogging", "", "", (), "", first, 0.9, None, 0.002)
+    own = {"pitch": estimate(period, 1e-6, "m")}
+    text = reported._overtone(EFFECTS["cogging"], own, [earlier])
+    assert told in text and bool(text) == bool(told)
+    assert reported._overtone(EFFECTS["cogging"], own, []) == ""
+
+
+@pytest.mark.parametrize(
+    ("here", "held", "refitted", "name"),
+    [
+        (0.001, 0.052, 0.049, "holdout_holds_more"),
+        (0.001, 0.008, 0.007, None),
+        (0.05, 0.09, 0.08, None),
+        (0.01, 0.3, 0.02, "holdout_differs"),
+    ],
+)
+def test_a_held_out_recording_that_holds_more_is_told(here, held, refitted, name):
+    pair = dict.fromkeys(("before", "after"))
+    fit = {
+        "filtered_force_error": pair | {"after": here},
+        "filtered_holdout_force_error": pair | {"after": held},
+        "filtered_holdout_refitted_error": refitted,
+    }
+    assert [remark.name for remark in summary._elsewhere(fit)] == ([name] if name else [])

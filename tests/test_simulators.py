@@ -10,7 +10,7 @@ import pytest
 from jaxfric import cli, explain, models, predict, simulators, terms
 from jaxfric.explanation.mismatch import fewest
 from jaxfric.simulators import Known, Mujoco
-from jaxfric.terms import KNOWN_FORCE
+from jaxfric.terms import KNOWN_FORCE, KNOWN_FRICTION
 from jaxfric.terms.effects import EFFECTS
 from tests.test_explain import CASES, PARAMETERS, healthy, planted
 
@@ -82,6 +82,19 @@ def test_missing_physics_beside_a_wrong_value(healthy):
 
 
 @pytest.mark.slow
+def test_a_wrong_value_keeps_its_interval_beside_an_axis_that_warms_in_both_recordings(healthy):
+    """Of the held-out one without its warming the friction would be another."""
+    warming = terms.ThermalDrift(terms.Coulomb())
+    runs = [planted(run, warming, (7.0,), (4.0,)) for run in healthy]
+    found = explain(runs[0], simulator(**{"viscous+": 90.0, "viscous-": 78.0}), runs[1])
+    named = {finding.effect: finding for finding in found.findings}
+    assert set(named) == {"thermal_drift", "parameter_mismatch"}
+    moved = named["parameter_mismatch"].parameters["viscous"]
+    assert abs(float(moved.value) + 24) < float(moved.estimate.half_width()) + 0.5
+    assert float(moved.estimate.half_width()) < 3.0
+    assert found.verdict == "explained"
+
+
 @pytest.mark.slow
 def test_a_bump_beside_dry_friction_that_is_wrong(healthy):
     """Beside the value as given the bump would take another shape, and the value would be lost."""
@@ -281,6 +294,36 @@ def test_a_wrong_value_of_a_mujoco_model(change, moved):
     assert found.to_dict()["findings"][0]["parameters"][moved]["from"] == before
     errors = found.fit["filtered_holdout_force_error"]
     assert errors["after"] < 0.05 * errors["before"]
+
+
+@pytest.mark.slow
+def test_friction_by_what_the_gear_carries_beside_a_mujoco_model():
+    """Of MuJoCo's force it is known what is its own friction, and the gear does not carry that."""
+    text, share = PENDULUM.format(damping=0.3, mass=1.0), 0.15
+    runs = []
+    for seed in (1, 2):
+        run = swung(text, seed)
+        known = Mujoco(text).beside(run).channels
+        borne = np.asarray(known[KNOWN_FORCE]) - np.asarray(known[KNOWN_FRICTION])
+        way = np.sign(np.gradient(np.asarray(run.position)))
+        runs.append(dataclasses.replace(run, force=run.force + share * np.abs(borne) * way))
+    found = explain(runs[0], Mujoco(text), runs[1])
+    (finding,) = found.findings
+    assert finding.effect == "load_dependent_friction" and found.verdict == "explained"
+    told = finding.parameters["reaction_friction"]
+    assert abs(float(told.value) - share) < 2 * float(told.half_width())
+    for name in ("force_error", "holdout_force_error"):  # by `predict`, sample by sample
+        assert found.fit[name]["after"] < 0.3 * found.fit[name]["before"]
+
+
+def test_a_hinge_by_which_all_turns_has_one_zero_with_the_tilt_of_its_base():
+    pytest.importorskip("mujoco")
+    arm = """<mujoco><worldbody><body><geom size="0.1"/><body><joint name="a" axis="0 1 0"/>
+      <geom size="0.1"/><body><joint name="b" axis="0 1 0"/><geom size="0.1"/></body></body></body>
+      {}</worldbody></mujoco>"""
+    other = '<body><joint name="c" axis="0 1 0"/><geom size="0.1" pos="9 0 0"/></body>'
+    assert [Mujoco(arm.format(""), "a").turns_all(name) for name in "ab"] == [True, False]
+    assert not Mujoco(arm.format(other), "a").turns_all("a")
 
 
 def test_models_that_no_log_of_an_axis_fits_are_refused():

@@ -107,10 +107,17 @@ def test_a_spring_with_which_a_joint_is_left_with_more_is_not(answered):
 
 
 def test_beside_a_spring_that_does_as_well_no_value_is_sure(answered):
-    answer = answered(spring(), again=joints(0.01, 0.01, 0.01))
+    def others():
+        base, shoulder, _ = joints(0.01, 0.01, 0.01)
+        told = explained(0.01, wrong("joint/elbow/damping"))
+        return [base, shoulder, shoulder._replace(name="elbow", told=told)]
+
+    answer = answered(spring(), again=others())
     assert "elastic" not in answer.source and sure(answer) == [True, False, False]
     # A twentieth of what no value explains is no reason to doubt those that explain the rest.
-    assert sure(answered(spring(0.05), again=joints(0.01, 0.01, 0.01))) == [True, True, True]
+    assert sure(answered(spring(0.05), again=others())) == [True, True, True]
+    # Nor is a spring beside which the same values are wrong.
+    assert sure(answered(spring(), again=joints(0.01, 0.01, 0.01))) == [True, True, True]
 
 
 def test_two_springs_are_told_without_their_stiffness(answered):

@@ -9,6 +9,7 @@ from ..terms.effects import traits
 from ..terms.friction import AbstractBump
 from ..terms.sample import Burden
 from . import parameters as spelled
+from .acceptance import OF_BASE
 from .burdens import IDEALISED, Machine, machine
 from .contest import Contest, Finalist
 from .evidence import Evidence
@@ -111,10 +112,10 @@ def nil(current: Fit, count: int, evidence: Evidence, wide: Evidence | None) -> 
 
 def told_parts(current: Fit, count: int, evidence: Evidence) -> Iterator[tuple[int, AbstractTerm]]:
     """Of the last `count` terms those made of forces by themselves, isolated pushes, without the
-    forces whose told interval holds zero, where others are left: their numbers, and what is left.
+    forces that are under a tenth of the largest and whose told interval holds zero: their numbers,
+    and what is left.
 
-    A push has a moment and a size of its own, and one that may be none says nothing. What stood out
-    beside the base alone may not beside the larger ones, which bend the base.
+    A large push bends the base by a part of itself, which then stands out elsewhere.
     """
     start = len(current.terms) - count
     if not any(traits(term).parts for term in current.terms[start:]):
@@ -122,10 +123,18 @@ def told_parts(current: Fit, count: int, evidence: Evidence) -> Iterator[tuple[i
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     own = spelled.estimates(current, block, evidence.motion.unit_names)
     for number, term in enumerate(current.terms[start:]):
-        intervals = [own[start + number][parameter.name].interval() for parameter in term.affine]
-        sure = [n for n, (low, high) in enumerate(intervals) if low * high > 0]
         some = traits(term).parts
-        if some is not None and 0 < len(sure) < len(intervals):
+        if some is None:
+            continue
+        values = [own[start + number][parameter.name] for parameter in term.affine]
+        least = OF_BASE**0.5 * max(abs(float(each.value)) for each in values)
+        ends = [each.interval() for each in values]
+        sure = [
+            n
+            for n, (each, (low, high)) in enumerate(zip(values, ends, strict=True))
+            if low * high > 0 or abs(float(each.value)) >= least
+        ]
+        if len(sure) < len(values):
             yield number, some(term, sure)
 
 

@@ -177,8 +177,9 @@ def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Find
             ratio = float(first.value) / float(own.value)
             error = math.hypot(*(float(p.half_width() / p.value) for p in (first, own)))
             if round(ratio) > 1 and abs(ratio / round(ratio) - 1) <= error < 0.5 / ratio:
-                whole = f"1/{round(ratio)} of the period of {quantity(first)}"
-                return f" That is {whole}: a harmonic of the same cause."
+                whole = quantity(Estimate(np.float64(first.value), np.float64(0.0), first.unit))
+                part = f"1/{round(ratio)} of the period of {whole}"
+                return f" That is {part}: a harmonic of the same cause."
     return ""
 
 

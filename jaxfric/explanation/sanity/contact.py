@@ -88,8 +88,9 @@ def _at_end(recording: Recording, upper: bool) -> Contact | None:
     if not rise * (far - near) > STEEP * 2 * (far - outward[pressed].min()):
         return None
     # What blocks the axis is not passed at other times, as far in as it was pressed half the time.
-    deep = valid & (outward >= np.median(outward[pressed]))
-    if np.count_nonzero(deep & (excess < most / HOLDS)) > 0.5 * len(pressed):
+    deep = np.median(outward[pressed])
+    free = np.count_nonzero(valid & (outward >= deep) & (excess < most / HOLDS))
+    if free > 0.5 * np.count_nonzero(outward[pressed] >= deep):
         return None
     visits = 1 + int(np.count_nonzero(np.diff(pressed) > 1))
     place = _place(outward[pressed], excess[pressed], visits)
