@@ -5,6 +5,7 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from .. import signals
@@ -37,10 +38,10 @@ def default_substeps(
     if signals.is_traced((model, reference, smooth)):
         return TRACED_SUBSTEPS
     with jax.ensure_compile_time_eval():
-        mass, slopes = rates(model, reference, smooth)
-        damping, stiffness = (jnp.nan_to_num(jnp.abs(slope)) / mass for slope in slopes)
-        rate = jnp.max(jnp.maximum(damping, jnp.sqrt(stiffness)))
-        steps = float(signals.interval(reference) * rate) / RATE_PER_STEP
+        mass, slopes = jax.tree.map(np.asarray, rates(model, reference, smooth))
+        damping, stiffness = (np.nan_to_num(np.abs(slope)) / mass for slope in slopes)
+        rate = float(np.max(np.maximum(damping, np.sqrt(stiffness))))
+        steps = float(signals.interval(reference)) * rate / RATE_PER_STEP
     if not math.isfinite(steps):
         return MOST_SUBSTEPS
     return min(max(math.ceil(steps), 1), MOST_SUBSTEPS)
@@ -63,7 +64,7 @@ def _rates(model, reference, smooth):
     speeds = jnp.maximum(speeds, slowest(dtype))
     rest = [] if smooth is None else [jnp.zeros(1, dtype)]
     grid = jnp.concatenate([speeds, -speeds, *rest])
-    chosen = jnp.linspace(0, goal.shape[0] - 1, 256).astype(int)
+    chosen = np.linspace(0, goal.shape[0] - 1, 256).astype(int)
     channels = {name: channel[chosen] for name, channel in reference.channels.items()}
     each_speed = jax.vmap(plant.rates, in_axes=(None, 0, None))
     surroundings = Surroundings(reference.time[chosen], channels)
