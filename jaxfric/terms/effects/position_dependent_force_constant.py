@@ -110,6 +110,7 @@ POSITION_DEPENDENT_FORCE_CONSTANT = Effect(
     coordinates=("position_by_acceleration", "position_by_direction"),
     needs=frozenset({"position", "predicted_force"}),
     confusable_with=("position_dependent_inertia", "position_dependent_friction", "cogging"),
+    composite=True,
     separate_by="Press on a force gauge with one command, at rest, in the middle and near both "
     "ends: inertia and friction of the axis do not show there.",
 )
