@@ -1,9 +1,14 @@
 """A force constant that varies along the stroke is named, and told as large as it is."""
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.explanation import search
+from jaxfric.explanation.findings import Findings, Solution
+from jaxfric.terms.effects import EFFECTS
 from jaxfric.validation import concealed
 
 NAME = "position_dependent_force_constant"
@@ -48,3 +53,52 @@ def test_it_is_named_and_its_ends_are_in_their_intervals(seed):
     assert "than in the middle" in found.findings[0].sentence
     errors = found.fit["holdout_force_error"]
     assert errors["after"] < 0.7 * errors["before"]
+
+
+class Term(NamedTuple):
+    """A selected term, as far as it is read here."""
+
+    name: str
+    rivals: tuple[str, ...] = ()
+
+    @property
+    def effect(self):
+        return EFFECTS[self.name]
+
+
+class Contest(NamedTuple):
+    size: float = 500.0
+
+
+class Selection(NamedTuple):
+    selected: list
+    remaining: Contest = Contest()
+
+    @property
+    def names(self):
+        return frozenset(each.name for each in self.selected)
+
+
+def findings(*selected):
+    solution = Solution(None, Selection(list(selected)))
+    return Findings(solution, solution)
+
+
+@pytest.mark.parametrize(
+    ("scores", "names", "rivals"),
+    [
+        ({1: 300.0, 2: 200.0}, (NAME,), [()]),
+        ({1: 200.0, 2: 300.0}, ("spring", "cogging"), [("end_stop",), ()]),
+        ({1: 300.0, 2: 298.0}, (NAME,), [("cogging", "spring")]),
+        ({1: 298.0, 2: 300.0}, ("spring", "cogging"), [("end_stop", NAME), (NAME,)]),
+    ],
+)
+def test_it_competes_as_a_whole_with_what_may_stand_in_its_place(
+    monkeypatch, scores, names, rivals
+):
+    one = findings(Term(NAME))
+    two = findings(Term("spring", ("end_stop", NAME)), Term("cogging"))
+    monkeypatch.setattr(search, "_score", lambda each, size: scores[len(each.selection.selected)])
+    better = search._of_two(one, two).selection.selected
+    assert tuple(each.name for each in better) == names
+    assert [each.rivals for each in better] == rivals

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..models import Model
 from ..terms.base import AbstractTerm
-from ..terms.effects import traits
+from ..terms.effects import EFFECTS, traits
 from . import verification
 from .acceptance import HALF
 from .baseline import as_given
@@ -44,20 +44,22 @@ def searched(
 
 
 def _of_two(found: Findings, other: Findings) -> Findings:
-    """The better ones of two findings, which may be the others where these do nearly as well."""
+    """The better ones of two findings, which may be the others where these do nearly as well.
+
+    An effect that is composite has been told, as a whole, from the effects in its place.
+    """
     size = min(each.selection.remaining.size for each in (found, other))
     scores = [_score(each, size) for each in (found, other)]
     if scores[1] > scores[0]:
         found, other = other, found
-    if abs(scores[1] - scores[0]) > RIVAL:
-        return found
+    told = abs(scores[1] - scores[0]) > RIVAL
     names = found.selection.names, other.selection.names
-    instead = sorted(names[1] - names[0])
 
     def rivalled(each: SelectedTerm) -> SelectedTerm:
-        shared = each.effect.name in names[1]
-        rivals = each.rivals if shared else (*each.rivals, *instead)
-        return each._replace(rivals=tuple(dict.fromkeys(rivals)))
+        rivals = tuple(name for name in each.rivals if not EFFECTS[name].composite)
+        if not told and each.effect.name not in names[1]:
+            rivals = tuple(dict.fromkeys((*rivals, *sorted(names[1] - names[0]))))
+        return each._replace(rivals=rivals)
 
     return found.with_selected(list(map(rivalled, found.selection.selected)))
 
