@@ -18,6 +18,10 @@ FAULTS = {
     "gain asymmetry": (terms.GainAsymmetry(), {"gain_asymmetry": 0.2}),
     "lower gain": (terms.GainAsymmetry(), {"gain_asymmetry": -0.4}),
     "force ripple": (terms.ForceRipple(), {"pitch": 0.04, "ripple_sin": 0.1, "ripple_cos": -0.05}),
+    "force constant": (
+        terms.PositionDependentForceConstant(-0.06, 0.04, 2),
+        {"command_at_low_end": 0.3, "command_at_high_end": 0.1},
+    ),
     "dead-band": (terms.ActuatorDeadband(), {"deadband": 2.0}),
     "saturation": (terms.ActuatorSaturation(), {"saturation": 0.3, "knee": 8.0}),
     "soft saturation": (

@@ -34,6 +34,10 @@ CASES = {
     "cogging": (T.Cogging(0.012), (0.6, 1.2)),
     "cogging_3": (T.Cogging(0.012, 3), (0.6, 1.2, 0.3, -0.5, 0.2, 0.4)),
     "force_ripple": (T.ForceRipple(0.012), (0.06, 0.03)),
+    "force_constant": (T.PositionDependentForceConstant(-0.04, 0.03), (0.2, 0.1)),
+    "force_constant_4": (
+        T.PositionDependentForceConstant(-0.025, 0.03, 4), (0.2, 0.05, 0.03, 0.1)
+    ),
     "spring": (T.Spring(0.01), (40.0,)),
     "hardening_spring": (T.HardeningSpring(0.005), (2e4,)),
     "end_stop": (T.EndStop(0.02), (80.0,)),
@@ -225,6 +229,8 @@ def rescaled(term, force, position):
         return T.Directional(rescaled(term.positive, force, position))
     if isinstance(term, T.Spring):
         return T.Spring(position * term.rest)
+    if isinstance(term, T.PositionDependentForceConstant):
+        return dataclasses.replace(term, low=position * term.low, high=position * term.high)
     if isinstance(term, T.PowerLaw):
         return T.PowerLaw(term.exponent, position * term.unit_speed)
     return term
@@ -270,6 +276,41 @@ def test_a_wave_that_does_not_repeat_within_the_stroke_may_be_an_unbalance():
     extent, slowly = Extent(0.0, 0.3), effects.EFFECTS["cogging"].variant
     assert slowly({"pitch": 1.01 * low}, extent) and not slowly({"pitch": 0.99 * low}, extent)
     assert high > 1.0
+
+
+@pytest.mark.parametrize("degree", [2, 4, 6])
+def test_a_force_constant_along_the_stroke_has_its_values_where_they_are_named(degree):
+    """On the way and at the ends of the stroke from −2 to 4, nil in the middle, level beyond."""
+    term = T.PositionDependentForceConstant(-2.0, 4.0, degree)
+    places = {"low_end": -2.0, "low_two_thirds": -1.0, "low_half": -0.5, "low_third": 0.0}
+    places |= {"high_third": 2.0, "high_half": 2.5, "high_two_thirds": 3.0, "high_end": 4.0}
+    assert len(term.affine) == degree
+    for k, parameter in enumerate(term.affine):
+        here = places[parameter.name.removeprefix("command_at_")]
+        for p in term.affine:
+            x = places[p.name.removeprefix("command_at_")]
+            expected = -7.0 if x == here else 0.0
+            assert column(term, at(x=x, predicted_force=-7.0), k) == pytest.approx(expected)
+        assert column(term, at(x=1.0, predicted_force=-7.0), k) == pytest.approx(0.0)
+        for beyond, end in ((-3.0, -2.0), (9.0, 4.0)):
+            levels = [column(term, at(x=x, predicted_force=2.0), k) for x in (beyond, end)]
+            assert levels[0] == levels[1]
+
+
+def test_two_parameters_are_any_parabola_of_the_force():
+    x = np.linspace(-0.02, 0.04, 31)
+    force = np.cos(100 * x)
+    recording = Recording(x, 0 * x, x, x, channels={"predicted_force": force})
+    columns = np.asarray(T.PositionDependentForceConstant(-0.02, 0.04).columns(recording))
+    place = (x - 0.01) / 0.03
+    fitted = columns @ [0.3 - 0.1, 0.3 + 0.1]  # 0.1 ξ + 0.3 ξ²
+    np.testing.assert_allclose(fitted, force * (0.1 * place + 0.3 * place**2), atol=1e-14)
+
+
+@pytest.mark.parametrize("wrong", [(1.0, 1.0, 2), (0.0, 1.0, 3), (0.0, 1.0, 0)])
+def test_a_force_constant_needs_a_stroke_and_an_even_degree(wrong):
+    with pytest.raises(ValueError, match="a low end below the high one, and the degree 2, 4 or 6"):
+        T.PositionDependentForceConstant(*wrong)
 
 
 @pytest.mark.slow
@@ -688,6 +729,7 @@ def test_the_catalogue_holds_together():
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance force_limit position_zero transport_delay actuator_lag clock sensor_filter "
         "actuator_deadband actuator_saturation "
+        "position_dependent_force_constant "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
         "periodic_disturbance disturbance_force disturbance_pulses cross_axis parameter_step"
     )

@@ -237,6 +237,30 @@ def test_ripple_of_the_force_constant_is_told_from_a_detent(healthy):
 
 
 @pytest.mark.slow
+def test_inertia_and_friction_that_both_vary_slowly_are_no_force_constant(healthy, monkeypatch):
+    """Alike in phase a force constant takes more than either alone, and so comes first."""
+    wave, stroke = (0.9, 0.5), float(np.ptp(np.asarray(healthy[0].position)))
+    runs = []
+    for log in healthy:
+        log = planted(log, terms.PositionDependentInertia(), wave, (2.2 * stroke,))
+        wavy = terms.PositionDependentFriction()
+        runs.append(planted(log, wavy, tuple(4 * x for x in wave), (2 * stroke,)))
+    compared, of_two = [], search._of_two
+
+    def spied(found, other):
+        compared.append(found.selection.names)
+        return of_two(found, other)
+
+    monkeypatch.setattr(search, "_of_two", spied)
+    found = explain(runs[0], "gaussian", runs[1])
+    assert compared and "position_dependent_force_constant" in compared[0]
+    named = {f.effect for f in found.findings}
+    assert named == {"position_dependent_inertia", "position_dependent_friction"}
+    for finding in found.findings:
+        assert "position_dependent_force_constant" not in finding.confusable_with
+
+
+@pytest.mark.slow
 def test_a_bump_that_falls_over_decades_of_the_speed_is_a_stribeck_bump(healthy):
     bump = terms.Generalised(0.02, 0.5)
     runs = [planted(log, bump, (8.0,)) for log in healthy]

@@ -74,6 +74,8 @@ LAWS = {
     ),
     "gain asymmetry": terms.GainAsymmetry(),
     "force ripple": terms.ForceRipple(0.2),
+    "force constant": terms.PositionDependentForceConstant(-0.6, 0.9),
+    "steep force constant": terms.PositionDependentForceConstant(-0.9, 0.3, 4),
     "dead-band": terms.ActuatorDeadband(),
     "saturation": terms.ActuatorSaturation(4.0),
     "soft saturation": terms.SoftSaturation(4.0),

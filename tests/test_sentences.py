@@ -223,3 +223,22 @@ def test_a_held_out_recording_that_holds_more_is_told(here, held, refitted, name
         "filtered_holdout_refitted_error": refitted,
     }
     assert [remark.name for remark in summary._elsewhere(fit)] == ([name] if name else [])
+
+
+@pytest.mark.parametrize(
+    ("more", "error", "text"),
+    [
+        (0.25, 0.01, "20.0% ± 1.3% lower at the low end"),
+        (-0.1, 0.02, "11.1% ± 4.9% higher at the low end"),
+        (0.25, 0.0, "20.0% lower at the low end"),
+        (0.25, 1.0, "other by an unknown amount at the low end"),
+    ],
+)
+def test_a_command_that_is_larger_is_told_as_a_force_constant_that_is_lower(more, error, text):
+    """1/(1 + h): of intervals [0.23, 0.27] and [-0.14, -0.06] [0.787, 0.813], [1.064, 1.163]."""
+    found = {
+        "command_at_low_end": estimate(more, error, "1"),
+        "command_at_high_end": estimate(0.5, 0.01, "1"),
+    }
+    said = sentence("position_dependent_force_constant", found, 0.9, ())
+    assert f"it is {text} of the stroke and 33.33% ± 0.89% lower at the high end than" in said

@@ -1,7 +1,7 @@
 """One round of the contest: every candidate on the grid, the best refined with the whole model."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,11 +100,13 @@ def contest(
     seed: int = 0,
     among: Callable[[Effect], bool] = lambda effect: True,
     needed: Callable[[Trial], float] = lambda trial: 0.0,
+    refused: frozenset[Hashable] = frozenset(),
 ) -> Contest:
     """Let every candidate compete for the residual of a fit; `evidence` with its predictions.
 
     `among`: whether an effect may be among the finalists; `needed`: the energy, N², that a
     trial's candidate must remove to be of use. Where none comes near it there are no finalists.
+    `refused`: forms of laws that may not win, and so keep no other from being looked at.
     """
     seen = evidence
     block = blocks(seen.elapsed[seen.centre], seen.reach)
@@ -132,7 +134,7 @@ def contest(
     beside = current.energy - bootstrap.scale**2
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
-    finalists = _finals(seen, current, field, eligible, size, within_reach)
+    finalists = _finals(seen, current, field, eligible, size, within_reach, refused)
     return Contest(trials, finalists, size)
 
 
@@ -182,13 +184,14 @@ def _finals(
     trials: list[Trial],
     size: float,
     within_reach: bool,
+    refused: frozenset[Hashable],
 ) -> list[Finalist]:
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     if not (bent or within_reach):
         return []
     basis = current.basis()
     # A sharp term may not be confirmed, and must not keep the next best from being looked at.
-    blunt = [t for t in trials if not t.effect.sharp]
+    blunt = [t for t in trials if not t.effect.sharp and t.candidate.form not in refused]
     leader = (blunt or trials)[0]
     enough = 0.5 * leader.score(leader.gain, size) - RIVAL
 

@@ -2,19 +2,21 @@
 
 from collections.abc import Hashable
 
+import numpy as np
+
 from ..models import Model
 from ..terms.base import AbstractTerm
-from ..terms.effects import traits
+from ..terms.effects import EFFECTS, traits
 from . import verification
 from .acceptance import HALF
 from .baseline import as_given
-from .contest import Contest
+from .contest import RIVAL, Contest
 from .findings import Findings, Solution, alone
 from .motion import Motion
 from .predictions import with_predictions
 from .problem import Problem, across_reversals, problem_of, realigned
 from .regression import fit
-from .selection import Selection
+from .selection import SelectedTerm, Selection
 from .stepwise import select
 from .timing import MOST_LATE, LateForce, late, overlooked, with_late_force
 
@@ -27,10 +29,56 @@ def searched(
 ) -> Findings:
     """The findings on a recording; laws of the forms in `refused` do not compete.
 
+    One law for all parts of the force takes more than the law of any one part, whatever is true.
+    Where it was found or came first, the search is done once more without it, and what explains
+    more, the numbers paid for, is told.
+    """
+    first = select(problem, seed, refused=refused, first=True)
+    found = _searched(motion, problem, seed, refused, first)
+    if not any(each.effect.composite for each in (*first.selected, *found.selection.selected)):
+        return found
+    every = problem.candidate_set.candidates
+    without = refused | {each.form for each in every if each.effect.composite}
+    first = select(problem, seed, refused=without, first=True)
+    return _of_two(found, _searched(motion, problem, seed, without, first))
+
+
+def _of_two(found: Findings, other: Findings) -> Findings:
+    """The better ones of two findings, which may be the others where these do nearly as well.
+
+    An effect that is composite has been told, as a whole, from the effects in its place.
+    """
+    size = min(each.selection.remaining.size for each in (found, other))
+    scores = [_score(each, size) for each in (found, other)]
+    if scores[1] > scores[0]:
+        found, other = other, found
+    told = abs(scores[1] - scores[0]) > RIVAL
+    names = found.selection.names, other.selection.names
+
+    def rivalled(each: SelectedTerm) -> SelectedTerm:
+        rivals = tuple(name for name in each.rivals if not EFFECTS[name].composite)
+        if not told and each.effect.name not in names[1]:
+            rivals = tuple(dict.fromkeys((*rivals, *sorted(names[1] - names[0]))))
+        return each._replace(rivals=rivals)
+
+    return found.with_selected(list(map(rivalled, found.selection.selected)))
+
+
+def _score(findings: Findings, size: float) -> float:
+    """The log-likelihood less the price of the numbers of all terms (Schwarz 1978)."""
+    terms = [each.trial.candidate.term for each in findings.selection.selected]
+    count = sum(len(term.affine) + len(term.nonlinear) + term.chosen for term in terms)
+    return -0.5 * float(size * np.log(_left(findings.undelayed)) + count * np.log(max(size, 2)))
+
+
+def _searched(
+    motion: Motion, problem: Problem, seed: int, refused: Refused, first: Selection
+) -> Findings:
+    """The findings on a recording that begin with the `first`.
+
     To first order a delay is a column; what it leaves of second order would be selected too. So
     where the force acts late it is put back, and the search is done once more.
     """
-    first = select(problem, seed, refused=refused, first=True)
     at_once = _late_at_once(motion, problem, first, seed, refused)
     if at_once is not None:
         return at_once

@@ -67,7 +67,7 @@ def select(
         least = partial(
             needed, current=current, evidence=evidence, base=problem.base, selected=selected
         )
-        found = contest(evidence, current, problem.candidate_set, seed, among, least)
+        found = contest(evidence, current, problem.candidate_set, seed, among, least, refused)
         there = [f for f in found.finalists if f.trial.candidate.form not in nothing]
         found = constrained(found._replace(finalists=there), current, evidence)
         spoiling = [f for f in found.finalists if f.trial.candidate.form in refused]

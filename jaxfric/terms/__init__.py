@@ -42,6 +42,9 @@ from .effects.load_dependent_friction import (
 from .effects.load_drift import LoadDrift as LoadDrift
 from .effects.parameter_step import ParameterStep as ParameterStep
 from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturbance
+from .effects.position_dependent_force_constant import (
+    PositionDependentForceConstant as PositionDependentForceConstant,
+)
 from .effects.position_dependent_friction import (
     PositionDependentFriction as PositionDependentFriction,
 )

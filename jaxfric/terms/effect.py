@@ -208,6 +208,8 @@ class Effect:
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
     - `several`: there may be more than one of it, as of two end stops.
     - `by_parameter`: its terms are of one parameter of the baseline each, and which, is told.
+    - `composite`: it acts on every part of the force alike, so that effects of one part each may
+      look like it together: they compete with it as a whole.
     - `vanishes`: nonlinear parameters without which there is none of it, a distance or a time.
     - `switches`: its column jumps with the sign of the force, which the command says best.
 
@@ -256,6 +258,7 @@ class Effect:
     ubiquitous: bool = False
     several: bool = False
     by_parameter: bool = False
+    composite: bool = False
     vanishes: tuple[str, ...] = ()
     switches: bool = False
     waves: Callable[[Any], Waves | None] = _no_waves

@@ -50,6 +50,7 @@ ABSENT = {
     "smooth_speed": 0.0, "presliding_shape": 0.0, "bristle_damping": 0.0, "lag_stages": 1.0,
     "deadband_shape": 0.0, "saturation_shape": 0.0, "reaction_friction": 0.0,
     "triangle": 0.0, "second": 0.0, "pitch2": 1.0, "cogging2_phase": 0.0, "ripple": 0.0,
+    "fall": 0.0, "fall_from": 0.0, "fall_distance": 1.0,
     "play": 0.0, "play_share": 0.0, "play_friction_share": 0.0,
     # loop and sensor
     "kp": 0.0, "ki": 0.0, "kd": 0.0, "velocity_filter": 1.0, "limit": np.inf, "resolution": 1.0,
@@ -58,7 +59,7 @@ ABSENT = {
 # Those that need the larger program.
 FURTHER = (
     "smooth_speed", "presliding_shape", "lag_stages", "deadband_shape", "saturation_shape",
-    "triangle", "second", "ripple", "play",
+    "triangle", "second", "ripple", "play", "fall",
 )  # fmt: skip
 
 

@@ -215,6 +215,26 @@ INERTIA: Kind = Kind(
 )
 
 
+# The motor's force by position
+
+
+def _draw_fall(rng, n, size):
+    best = n.plan.low + rng.uniform(0.1, 0.9) * n.plan.stroke
+    truth = {"fall_from": best, "fall_distance": float(np.max(np.abs(n.x - best)))}
+    return scaled(FALL, "fall", truth, n, size, 0.5)
+
+
+FALL: Kind = Kind(
+    _draw_fall,
+    # To first order: the command is 1/(1 − c) of the force.
+    lambda t, n: t["fall"] * ((n.x - t["fall_from"]) / t["fall_distance"]) ** 2 * n.u,
+    named(fall="fall", fall_from="fall_from", fall_distance="fall_distance"),
+    lambda truth: f"position by force, farthest from {truth['fall_from']:.4g}",
+    loud=True,
+    follows=False,
+)
+
+
 KINDS = {
     "gravity_unbalance": UNBALANCE,
     "cogging": COGGING,
@@ -224,4 +244,5 @@ KINDS = {
     "position_dependent_friction": WAVY,
     "sticky_spot": SPOT,
     "position_dependent_inertia": INERTIA,
+    "position_dependent_force_constant": FALL,
 }

@@ -35,7 +35,7 @@ def remember(p, memory, v, keep, span, level):
 
 
 def delivered(p, memory, x):
-    """What is left of a command: dead-band, limit, gain, and a current that ripples."""
+    """What is left of a command: dead-band, limit, gain, and a force constant by place."""
     force = jnp.where(p["lag_stages"] == 2.0, memory.force2, memory.force)
     size = jnp.abs(force)
     gap = jnp.maximum(p["deadband"], 1e-30)
@@ -47,7 +47,8 @@ def delivered(p, memory, x):
     limited = jnp.where(shape == TANH, bent, jnp.minimum(size, p["knee"]))
     size = jnp.where(shape == PARTIAL, partial, limited)
     ripple = 1 + p["ripple"] * jnp.sin(2 * jnp.pi * x / p["pitch2"] + p["cogging2_phase"])
-    return jnp.sign(force) * size / jnp.where(force > 0, 1 + p["gain"], 1.0) / ripple
+    constant = 1 - p["fall"] * ((x - p["fall_from"]) / p["fall_distance"]) ** 2
+    return jnp.sign(force) * size / jnp.where(force > 0, 1 + p["gain"], 1.0) / ripple * constant
 
 
 def field(p, x):
