@@ -218,6 +218,7 @@ def test_a_damaged_force_limit_is_refused(value):
         models.load(json.dumps(document))
 
 
+@pytest.mark.slow
 def test_a_held_force_acts_half_a_sample_after_its_stamp():
     """A log at 250 Hz, its model exact: all that `predict` leaves is when the force acts."""
     t = np.arange(4000) / 250.0

@@ -215,6 +215,7 @@ def test_predict_writes_the_force_of_the_motion(axis, saved, tmp_path, capsys):
     assert "force error" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_simulate_follows_a_set_point_or_a_force(saved, tmp_path, capsys):
     time = np.arange(1000) / 1000
     goal = tmp_path / "goal.csv"

@@ -54,6 +54,7 @@ def test_points_are_the_friction_at_the_speeds_held():
     assert sum(line.startswith("not evaluated ") for line in lines) == len(test.not_evaluated)
 
 
+@pytest.mark.slow
 def test_a_dead_sensor_contradicts_no_curve():
     recording = staircase(bumped)
     dead = dataclasses.replace(recording, force=np.full(recording.num_samples, 3.0))

@@ -847,7 +847,9 @@ def test_a_tone_faster_than_those_that_are_scanned_for_is_found(healthy, monkeyp
     assert not len(fast_tones(posed, both))
 
 
-@pytest.mark.parametrize("beyond", [0.98, 1.0005, 1.02])
+@pytest.mark.parametrize(
+    "beyond", [0.98, *(pytest.param(part, marks=pytest.mark.slow) for part in (1.0005, 1.02))]
+)
 def test_a_tone_beyond_what_rows_tell_is_not_taken_for_one_as_much_below(healthy, beyond):
     """Rows are half a kernel apart: one period in that half is as fast as they tell."""
     posed = problem.problem_of(healthy[0], models.named("gaussian"))

@@ -146,6 +146,7 @@ def test_the_object_does_what_the_scan_does(how):
     assert follower.strokes == tuple(int(c) for c in state.strokes)
 
 
+@pytest.mark.slow
 def test_memory_is_constant_and_the_update_is_pure():
     state = online.start(1e-3, 0.2)
     shapes = jax.tree.map(jnp.shape, state)

@@ -186,6 +186,7 @@ def test_zeros_are_not_believed_where_few_columns_do_not_account_for_the_mismatc
         assert "position_zero" not in wrong(each)
 
 
+@pytest.mark.slow
 def test_columns_of_another_joint(motion):
     time, position, force = motion
     for each, other in zip(
