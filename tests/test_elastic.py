@@ -7,6 +7,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import cli
+from jaxfric.explanation import spring_trial
 from jaxfric.explanation.agreement import Told
 from jaxfric.explanation.elasticity import STIFFNESS, ElasticJoint, elastic_joint
 from jaxfric.export.springs import new_springs
@@ -248,3 +249,9 @@ def test_the_inertia_of_a_motor_that_the_file_lacks_is_found_beside_its_spring(t
     model = mujoco.MjModel.from_xml_string(text)
     assert model.jnt_stiffness[2] == pytest.approx(350, rel=0.1)
     assert model.dof_armature[1] == pytest.approx(0.03, rel=0.1)
+
+
+def test_nodes_without_samples_have_times():
+    """What is averaged over no sample is zero; beyond the nodes the last one is repeated."""
+    times = np.array([1.0, 2.0, 3.0, 0.0, 5.0, 6.0, 0.0, 0.0, 9.0, 0.0, 9.0, 9.0])
+    np.testing.assert_allclose(spring_trial._steady(times, 10), 1.0 + np.arange(12), rtol=1e-12)

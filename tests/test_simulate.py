@@ -18,7 +18,7 @@ from jaxfric.simulation.control import PD, PID, Cascade, Encoder
 from jaxfric.simulation.lateness import at_once
 from jaxfric.simulation.prediction import predict
 from jaxfric.simulation.simulating import simulate
-from jaxfric.simulation.substeps import default_substeps
+from jaxfric.simulation.substeps import MOST_SUBSTEPS, default_substeps
 from jaxfric.terms import AbstractLaw, ClockOffset, Parameter, SensorFilter, TransportDelay
 from jaxfric.units import INERTIA, STIFFNESS
 from tests.machines import relative_error
@@ -393,3 +393,15 @@ def test_a_delay_is_predicted_in_whole_inside_each_segment():
     np.testing.assert_array_equal(early[1980:2000], np.full(20, at_once[1999]))
     seen = dataclasses.replace(run, force=early)
     assert float(relative_error(late, seen)) < 0.01 < 0.05 < float(relative_error(model, seen))
+
+
+@pytest.mark.parametrize("slope", [np.inf, np.nan, 1e308])
+def test_a_vertical_friction_curve_gets_the_most_steps_and_no_warning(slope, monkeypatch):
+    found = np.array([0.5]), (np.array([slope]), np.array([0.0]))
+    monkeypatch.setattr("jaxfric.simulation.substeps.rates", lambda *_: found)
+    time = np.arange(10) * 1e-3
+    reference = Recording(time, 0 * time, 0 * time)
+    values = {"inertia": 1.0, "viscous": 1.0}
+    model = models.from_parameters(terms.Inertia() + terms.Viscous(), values)
+    steps = default_substeps(model, reference)
+    assert steps == (1 if np.isnan(slope) else MOST_SUBSTEPS)

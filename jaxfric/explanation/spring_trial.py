@@ -211,13 +211,11 @@ class Trial:
 
 def _steady(time: np.ndarray, count: int) -> np.ndarray:
     """Times of nodes, those without samples and those that fill the length up too."""
-    own, number = time[:count], np.arange(count)
-    known = np.diff(np.maximum.accumulate(own), prepend=-np.inf) > 0
-    own = np.interp(number, number[known], own[known])
-    step = float(np.median(np.diff(own)))
-    own = np.maximum.accumulate(own + 1e-6 * step * number)  # beyond the last one that is known
-    more = own[-1] + step * np.arange(1, len(time) - count + 1)
-    return np.concatenate([own, more])
+    known = np.flatnonzero(np.diff(np.maximum.accumulate(time[:count]), prepend=-np.inf) > 0)
+    step = float(np.median(np.diff(time[known]) / np.diff(known)))
+    number = np.arange(len(time))
+    beyond = np.maximum(number - known[-1], 0)
+    return np.interp(number, known, time[known]) + step * beyond
 
 
 def _box(nodes: Nodes, evidence: Evidence) -> Box:

@@ -39,8 +39,9 @@ def default_substeps(
         return TRACED_SUBSTEPS
     with jax.ensure_compile_time_eval():
         mass, slopes = jax.tree.map(np.asarray, rates(model, reference, smooth))
-        damping, stiffness = (np.nan_to_num(np.abs(slope)) / mass for slope in slopes)
-        rate = float(np.max(np.maximum(damping, np.sqrt(stiffness))))
+        with np.errstate(all="ignore"):  # what is not finite gets the most steps
+            damping, stiffness = (np.nan_to_num(np.abs(slope)) / mass for slope in slopes)
+            rate = float(np.max(np.maximum(damping, np.sqrt(stiffness))))
         steps = float(signals.interval(reference)) * rate / RATE_PER_STEP
     if not math.isfinite(steps):
         return MOST_SUBSTEPS

@@ -38,6 +38,8 @@ class PositionDependentForceConstant(AbstractLaw):
     are given numbers; beyond them the ends' values hold. (Klippel, "Tutorial: loudspeaker
     nonlinearities: causes, parameters, symptoms", J. Audio Eng. Soc. 54(10), 2006: a coil's force
     factor Bl(x).)
+
+    **Raises:** `ValueError` for a low end that is not below the high one, or another degree.
     """
 
     low: float = eqx.field(static=True, default=-1.0)
