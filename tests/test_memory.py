@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tracemalloc
 
+import jax
 import numpy as np
 import pytest
 
@@ -43,6 +44,24 @@ def test_an_excerpt_is_spread_over_the_recording_and_begins_segments():
     # Masked samples at the end, by which recordings are padded, are no part of it.
     longer = pad(recording, count + 4096)
     np.testing.assert_array_equal(np.asarray(excerpt(longer).time), time)
+
+
+@pytest.mark.parametrize("count", [MOST + 1000, int(1.5 * MOST) + 2])
+def test_samples_at_the_end_that_are_not_valid_do_not_matter_to_a_long_recording(count):
+    time = 1e-3 * np.arange(count)
+    position = np.round(0.03 * np.sin(4 * time), 6)
+    late = 0.12 * np.cos(4 * (time - 0.004))
+    mask = time < time[int(1.2 * MOST) if count > 1.5 * MOST else -1]
+    recording = jf.Recording(
+        time=time, force=np.sign(late), position=position, velocity=late, mask=mask
+    )
+    assert excerpt(recording) is recording
+    less = jax.tree.map(lambda values: np.asarray(values)[mask], recording)
+    assert signals.choose(recording) == signals.choose(less)
+    velocity = np.asarray(signals.Ready.of(recording).recording.velocity)
+    assert len(velocity) == count
+    inside = slice(1000, np.count_nonzero(mask) - 1000)
+    np.testing.assert_allclose(velocity[inside], 0.12 * np.cos(4 * time[inside]), atol=5e-4)
 
 
 def test_a_recording_of_usual_length_is_whole():

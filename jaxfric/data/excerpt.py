@@ -23,9 +23,9 @@ def excerpt(recording: Recording, most: int = MOST) -> Recording:
 
     **Arguments:** `recording`, signals of shape `(N,)`, not traced; `most`, of its samples.
     """
-    if recording.num_samples <= SPARE * most:
-        return recording
     spread = pieces(np.asarray(recording.mask), most)
+    if len(spread) == 1:
+        return recording
     some = jax.tree.map(lambda values: cut(np.asarray(values), spread), recording)
     begins = np.zeros(len(some.time), bool)
     begins[np.cumsum([part.stop - part.start for part in spread[:-1]])] = True
@@ -35,12 +35,16 @@ def excerpt(recording: Recording, most: int = MOST) -> Recording:
 
 
 def pieces(mask: np.ndarray, most: int = MOST) -> list[slice]:
-    """Where those pieces lie, in order; `mask`: which samples are valid, `(N,)`."""
+    """Where those pieces lie, in order; `mask`: which samples are valid, `(N,)`.
+
+    One, of all samples, where hardly more than `most` of them are left without those at the end
+    that are not valid.
+    """
     count = len(mask)
     if not mask[-1]:  # what a recording is padded with decides nothing
         count = int(np.max(np.flatnonzero(mask), initial=-1)) + 1
     if count <= SPARE * most:
-        return [slice(0, count)]
+        return [slice(0, len(mask))]
     length = most // PIECES
     starts = np.linspace(0, count - length, PIECES).round().astype(int)
     return [slice(start, start + length) for start in starts.tolist()]

@@ -72,9 +72,9 @@ def choose(recording: Recording, signal: np.ndarray | None = None, order: int = 
     **Arguments:** `signal`, `(N,)`, by default the position; `order` of the derivative, 1 or 2.
     """
     whole = np.asarray(recording.position if signal is None else signal)
-    if recording.num_samples > MOST:
-        whole = cut(whole, pieces(np.asarray(recording.mask)))
-        recording = excerpt(recording)
+    spread = pieces(np.asarray(recording.mask))
+    if len(spread) > 1:
+        whole, recording = cut(whole, spread), excerpt(recording)
     log = SampledSignal.of(recording, whole).trimmed()
     noise = min(log.noise(), LARGEST)
     levels = [_level(log, rung, order) for rung in _ladder(log.longest)]
