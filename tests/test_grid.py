@@ -286,6 +286,26 @@ def test_any_term_is_found_from_the_default_bounds(name):
     assert not misses(found, model)
 
 
+def test_each_direction_keeps_its_own_parameters_of_two_laws():
+    """β is sorted by laws, the search by directions."""
+    gaussian = models.gaussian()
+    run, term = motion(), T.Directional(T.SmoothCrossing(0.003), T.SmoothCrossing(0.02))
+    model = machine(gaussian, term, (25.0, 12.0))
+    found = jf.identify(gaussian + T.Directional(T.SmoothCrossing()), with_force(run, model, 0.1))
+    assert not misses(found, model, share=0.02)
+
+
+def test_the_directions_may_obey_different_laws():
+    run = motion()
+    sides = T.Coulomb() + T.Viscous() + T.Gaussian(), T.Coulomb() + T.Viscous()
+    for order, name in ((sides, "stribeck_force+"), (sides[::-1], "stribeck_force-")):
+        structure = T.Inertia() + T.Directional(*order)
+        model = machine(structure, T.Offset(), (0.0,))
+        found = jf.identify(structure, with_force(run, model, 0.1))
+        assert not misses(found, model, share=0.02)
+        assert float(found.parameters[name].value) == pytest.approx(8.0, rel=0.05)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "base, name",

@@ -2,10 +2,11 @@
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..data.recording import Recording
-from ..terms.base import AbstractTerm
+from ..terms.base import AbstractTerm, Directional, summands
 from . import reduced
 from .projections import Rows
 
@@ -21,15 +22,34 @@ class Problem(eqx.Module):
     alike: bool = eqx.field(static=True)
 
     def columns(self, term: AbstractTerm, unit, box=None) -> Float[Array, "J k"]:
-        """The rows of the nonlinear columns of a term at a point of the unit cube, or of `box`."""
-        box = self.box if box is None else box
-        beta = reduced.decode(unit, box, self.logarithmic[: box.shape[1]])
+        """The rows of the nonlinear columns of a term at a point of the unit cube, or of `box`,
+        that of one direction.
+        """
+        one_way = box is not None
+        box, logarithmic = (box, self.logarithmic_side) if one_way else (self.box, self.logarithmic)
+        beta = reduced.decode(unit, box, logarithmic)
         return self.rows.columns(term.with_beta(beta), self.recording)
+
+    @property
+    def order(self) -> np.ndarray:
+        """Where the parameters of each direction stand in β, where it has its own, `(2, d/2)`."""
+        sides, start = ([], []), 0
+        for part in summands(self.term):
+            if isinstance(part, Directional):
+                for own, side in zip(sides, (part.positive, part.negative), strict=True):
+                    own += range(start, start + len(side.nonlinear))
+                    start += len(side.nonlinear)
+        return np.array(sides)
+
+    @property
+    def logarithmic_side(self) -> tuple[bool, ...]:
+        """Whether the scale of each parameter of one direction is a ratio."""
+        return tuple(self.logarithmic[i] for i in self.order[0])
 
     @property
     def boxes(self) -> Float[Array, "2 2 d"]:
         """The bounds of each direction's β, where it has its own."""
-        return jnp.moveaxis(self.box.reshape(2, 2, -1), 1, 0)
+        return jnp.moveaxis(self.box[:, self.order], 1, 0)
 
     @property
     def root(self) -> Float[Array, " J"]:

@@ -36,8 +36,10 @@ def part(term: AbstractTerm, nonlinear: bool) -> AbstractTerm | None:
         kept = tuple(p for p in (part(t, nonlinear) for t in term.terms) if p is not None)
         return Sum(kept) if kept else None
     if isinstance(term, Directional):
-        positive, negative = part(term.positive, nonlinear), part(term.negative, nonlinear)
-        return None if positive is None else Directional(positive, negative)
+        sides = [part(side, nonlinear) for side in (term.positive, term.negative)]
+        if sides == [None, None]:
+            return None
+        return Directional(*(Sum(()) if side is None else side for side in sides))
     return term if bool(term.nonlinear) is nonlinear else None
 
 

@@ -51,6 +51,8 @@ def _sides(term: AbstractTerm):
     sided = [t for t in terms if isinstance(t, Directional)]
     if not any(t.nonlinear for t in sided) or any(t.nonlinear for t in shared):
         return None
+    if any(jax.tree.structure(t.positive) != jax.tree.structure(t.negative) for t in sided):
+        return None
     positive = Sum(tuple(leaf for t in sided for leaf in summands(t.positive)))
     return shared, positive
 
@@ -247,10 +249,12 @@ def _grid_sides(sides, problem: Problem, points):
         def values(beta, _):
             return rows.columns(bumps.with_beta(beta), recording)[:, 0]
 
-        logarithmic = problem.logarithmic[:count]
-        here = Sides(values, values, rows.time, moments, problem.boxes, logarithmic, problem.alike)
+        scale = problem.logarithmic_side
+        here = Sides(values, values, rows.time, moments, problem.boxes, scale, problem.alike)
         best = _best(grid, here.costs(grid))
-    both = _Best(best.start.reshape(-1), jnp.tile(best.cell, 2))
+    at = jnp.asarray(problem.order.ravel())
+    start, cell = best.start.ravel(), jnp.tile(best.cell, 2)
+    both = _Best(jnp.zeros_like(start).at[at].set(start), jnp.zeros_like(cell).at[at].set(cell))
     # Shared terms tie the directions; then neither is a problem of its own.
     return both if shared else both._replace(sides=best.sides, samples=best.samples)
 
@@ -277,8 +281,8 @@ def _bump_sides(problem, bump: AbstractBump, grid, columns, target, roots, linea
         return bump.with_beta(beta).ratio(speed, slowest)
 
     def sides(places, moments):
-        logarithmic = problem.logarithmic[: grid.shape[1]]
-        return Sides(contrast, ratio, places, moments, problem.boxes, logarithmic, problem.alike)
+        scale = problem.logarithmic_side
+        return Sides(contrast, ratio, places, moments, problem.boxes, scale, problem.alike)
 
     if _straight(linear) and grid.shape[0] >= compress.LEAST_POINTS:
         # The first nonlinear parameter of a bump is its width.

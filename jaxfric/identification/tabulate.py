@@ -220,8 +220,8 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
     if falling:
         lines.append(
             f"{' and '.join(falling)} negative: friction falls towards zero speed instead of "
-            "rising. That is no Stribeck effect; presliding, lag or a dead time near reversals "
-            "looks so."
+            "rising. That is no Stribeck effect; friction that passes zero speed gradually, "
+            "presliding, lag or a dead time near reversals looks so."
         )
     if faint:
         lines.append(

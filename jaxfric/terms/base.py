@@ -205,10 +205,10 @@ class Sum(AbstractTerm):
         return any(term.inertial for term in self.terms)
 
     def columns(self, recording: Recording) -> Float[Array, "N p"]:
-        return jnp.concatenate([term.columns(recording) for term in self.terms], axis=-1)
+        return _beside([term.columns(recording) for term in self.terms], recording)
 
     def momentum(self, recording: Recording) -> Float[Array, "N p"]:
-        return jnp.concatenate([term.momentum(recording) for term in self.terms], axis=-1)
+        return _beside([term.momentum(recording) for term in self.terms], recording)
 
     def offset(self, recording: Recording) -> Float[Array, " N"]:
         return sum((term.offset(recording) for term in self.terms), jnp.zeros_like(recording.time))
@@ -341,6 +341,12 @@ def bounds(
         pair = own if own is not None else parameter.bounds(scales)
         pairs.append(jnp.stack([jnp.asarray(limit, scales.fastest.dtype) for limit in pair]))
     return jnp.stack(pairs, axis=1) if pairs else jnp.zeros((2, 0), scales.fastest.dtype)
+
+
+def _beside(parts: Sequence[Float[Array, "N k"]], recording: Recording) -> Float[Array, "N p"]:
+    """Columns beside each other, of however many terms."""
+    none = jnp.zeros((recording.num_samples, 0), recording.time.dtype)
+    return jnp.concatenate(parts, axis=-1) if parts else none
 
 
 def _batched(body, recording: Recording) -> Float[Array, "N p"]:
