@@ -27,6 +27,7 @@ CASES = {
     "asymmetry": (T.FrictionAsymmetry(), (1.0, 3.0)),
     "coulomb_forwards": (T.CoulombAsymmetry("forwards"), (1.0,)),
     "coulomb_backwards": (T.CoulombAsymmetry("backwards"), (1.0,)),
+    "crossing": (T.SmoothCrossing(0.004), (15.0,)),
     "quadratic_drag": (T.QuadraticDrag(), (100.0,)),
     "power_law": (T.PowerLaw(2.5, 0.2), (5.0,)),
     "shear_thinning": (T.ShearThinning(0.05), (60.0,)),
@@ -724,7 +725,8 @@ def test_identify_finds_the_nonlinear_parameters_too(healthy, name):
 
 def test_the_catalogue_holds_together():
     reference_names = (
-        "parameter_mismatch asymmetric_friction stribeck viscous_nonlinearity gravity_unbalance "
+        "parameter_mismatch asymmetric_friction smooth_friction stribeck viscous_nonlinearity "
+        "gravity_unbalance "
         "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance force_limit position_zero transport_delay actuator_lag clock sensor_filter "

@@ -62,6 +62,7 @@ LAWS = {
     "ramp": terms.FrictionStep(terms.Coulomb(), 0.2, ramp=0.3),
     "gradual": terms.FrictionRamp(terms.Coulomb(), 0.2, 0.5),
     "warming by direction": terms.ThermalDrift(Directional(terms.Coulomb()), 0.6),
+    "crossing": Directional(terms.SmoothCrossing(0.1), terms.SmoothCrossing(0.2)),
     "directional": Directional(
         terms.Coulomb() + terms.Viscous() + terms.Gaussian(0.05),
         terms.Coulomb() + terms.Viscous() + terms.Gaussian(0.08),

@@ -38,6 +38,7 @@ CASES = {
     "lorentzian": Lorentzian(0.3),
     "exponential": Exponential(0.3),
     "generalised": Generalised(0.3, 1.4),
+    "crossing": terms.SmoothCrossing(0.3),
     "inertia": Inertia(),
     "offset": Offset(),
     "gravity": terms.Gravity(),

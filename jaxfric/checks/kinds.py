@@ -294,8 +294,9 @@ KINDS = (
         "The model misses the friction curve by up to {value:.3g} {force}, most at {at:.3g} "
         "{position}/s, and not as noise: its law of velocity is another one than the axis's. The "
         "intervals hold noise and not a wrong law, so that parameters may be off by more. Add what "
-        "is curved there (a Stribeck bump, a drag that grows or thins with the speed), or try "
-        "jaxfric select; jaxfric explain looks for what fits.",
+        "is curved there (a Stribeck bump, a gradual change of sign at zero speed, a drag that "
+        "grows or thins with the speed), or try jaxfric select; jaxfric explain looks for what "
+        "fits.",
     ),
     Kind("curve_missed_at", False, ""),
     Kind(

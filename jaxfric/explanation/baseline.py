@@ -20,7 +20,8 @@ class Baseline(NamedTuple):
 
     Of another recording also what it obeys, term by term, `fit`, and the standard errors of its
     parameters, affine ones first, `(P,)`; `structured`, the coordinates over which it leaves
-    structure, and whether its residual is `rough`: neither is a difference.
+    structure, and whether its residual is `rough`: neither is a difference. `start`: β from which
+    the sum is fitted, `(d,)`, where they are known.
     """
 
     structure: AbstractTerm
@@ -30,6 +31,7 @@ class Baseline(NamedTuple):
     fit: Fit | None = None
     structured: frozenset[str] = frozenset()
     rough: bool = False
+    start: np.ndarray | None = None
 
 
 def baseline_of(given) -> Baseline:
@@ -37,6 +39,8 @@ def baseline_of(given) -> Baseline:
 
     **Raises:** `ValueError` for anything else, and for a model that lacks values.
     """
+    if isinstance(given, Baseline):
+        return given
     if isinstance(given, str):
         return Baseline(named(given), given)
     if isinstance(given, Identified):

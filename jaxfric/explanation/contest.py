@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..terms.effect import Effect
+from ..terms.effect import Effect, inside
 from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
 from .many_minima import BEYOND_CHANCE, among_many, noise, promise
@@ -197,12 +197,14 @@ def _finals(
 
     def final(numbered: tuple[int, Trial]) -> Finalist | None:
         number, trial = numbered
-        found = None
+        fits = []
         if number < FINALISTS and trial.score(trial.gain, size) >= enough:
-            found = _refined(seen, current, field, trial, basis)
-        if bent and _imitated(trial, current):
-            again = _afresh(seen, current, trial)
-            found = again if found is None or again.energy < found.energy else found
+            fits.append(_refined(seen, current, field, trial, basis))
+        if bent and imitated(trial, current):
+            fits += _afresh(seen, current, trial)
+        # The base's bump upside down is near to a law of the other sign.
+        fits = [each for each in fits if _sensible(trial, each.alpha)] or fits
+        found = min(fits, key=lambda each: each.energy, default=None)
         harmonics = None if found is None else _harmonics(found, seen, basis)
         if harmonics is not None and harmonics[0] < 0.25 * harmonics.max():
             trial = _overtone(trial, found, int(np.argmax(harmonics)))
@@ -324,14 +326,18 @@ def _between(trial: Trial) -> np.ndarray:
 _SPEED = frozenset({"velocity"})
 
 
-def _imitated(trial: Trial, current: Fit) -> bool:
+def imitated(trial: Trial, current: Fit) -> bool:
     """Whether the base may have bent its own curve in velocity to what the candidate is."""
-    velocity = trial.candidate.term.coordinates <= _SPEED and len(trial.beta) < 2
-    return velocity and bool(current.terms[0].nonlinear)
+    return trial.candidate.term.coordinates <= _SPEED and bool(current.terms[0].nonlinear)
 
 
-def _afresh(seen, current, trial) -> Finalist:
-    """The whole model with the candidate, the base's nonlinear parameters looked for anew."""
-    terms = (*current.terms, trial.candidate.term)
-    found = fit(terms, seen, [None, *current.betas[1:], trial.beta], 8)
-    return Finalist(0.0, trial, 1.0, found.energy, found.betas, found.alphas[-1])
+def _afresh(seen, current, trial) -> list[Finalist]:
+    """The whole model with the candidate, the base's nonlinear parameters looked for anew beside
+    the candidate as its grid has it, and the candidate's beside the base's in the middle.
+    """
+    base = current.terms[0]
+    middle = inside(base, seen.limits, np.full(len(base.nonlinear), 0.5))
+    starts = [(None, trial.beta), (middle, None)] if len(trial.beta) else [(None, trial.beta)]
+    terms, others = (*current.terms, trial.candidate.term), current.betas[1:]
+    fits = (fit(terms, seen, [first, *others, last], 8) for first, last in starts)
+    return [Finalist(0.0, trial, 1.0, each.energy, each.betas, each.alphas[-1]) for each in fits]

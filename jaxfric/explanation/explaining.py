@@ -22,6 +22,7 @@ from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
 from .holdout import check_signals, confirmed, measured
+from .idealised import idealised, with_idealised
 from .improvement import Errors, Improved, improved, without_unsure
 from .inputs import Inputs, prepare
 from .mismatch import Mismatch, mismatch
@@ -104,7 +105,7 @@ def _explain(
     doing("fitting the baseline")
     known = _known(baseline, seed)
     motion, held = motion_of(recording), None if holdout is None else motion_of(holdout)
-    problem = problem_of(motion, known.structure)
+    problem = problem_of(motion, known.structure, start=known.start)
     seen = None if inputs.checked or inputs.free else sanity.stopped(motion, problem, held)
     if seen is not None and seen.stops:
         for candidates in problem.candidate_sets:
@@ -124,7 +125,8 @@ def _explain(
         there = found.fit["holdout_force_error"]
         if there is None or not there["after"] > there["before"]:
             return found
-        problem = problem_of(motion, known.structure)  # the other recording knows of no limit
+        # The other recording knows of no limit.
+        problem = problem_of(motion, known.structure, start=known.start)
     if held is not None:
         with_holdout(problem, held)  # says what is wrong with it before anything takes time
     if known.fit is not None:
@@ -134,6 +136,12 @@ def _explain(
         wrong, better = _unjudged(known, nothing(problem), inputs, doing, seed)
     else:
         wrong, better = _with_tone(known, motion, problem, inputs, seed, doing)
+    small = idealised(known, better, inputs.figures)
+    if small is not None:
+        for candidates in problem.candidate_sets:
+            candidates.close()
+        found = _explain(inputs._replace(baseline=small.baseline), simulate, seed, doing)
+        return with_idealised(found, small)
     if held is not None:
         doing("validating on the held-out recording")
         check_signals(better.findings.selection, recording, holdout)
@@ -186,7 +194,7 @@ def _with_tone(
         return found
     for candidates in problem.candidate_sets:
         candidates.forget()
-    narrow = problem_of(motion, problem.structure, half_width=width)
+    narrow = problem_of(motion, problem.structure, half_width=width, start=problem.start)
     again = _found(known, motion, narrow, inputs, seed, doing)
     names = set(better.findings.selection.names)
     same = names <= set(again[1].findings.selection.names)

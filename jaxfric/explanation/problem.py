@@ -49,6 +49,7 @@ class Problem(NamedTuple):
     - `in_slip`: where rows reach across reversals, the problem with rows in slip alone.
     - `creeps`: whether these were left out since the axis creeps through zero velocity.
     - `held`: rows of the held-out recording, once everything has been chosen without it.
+    - `start`: β from which the baseline is fitted, `(d,)`; `None` where it is looked for.
     """
 
     evidence: Evidence
@@ -62,6 +63,7 @@ class Problem(NamedTuple):
     in_slip: "Problem | None" = None
     creeps: bool = False
     held: Evidence | None = None
+    start: np.ndarray | None = None
 
     @property
     def reversals(self) -> bool:
@@ -84,20 +86,21 @@ def problem_of(
     structure: AbstractTerm,
     before: Problem | None = None,
     half_width: int | None = None,
+    start: np.ndarray | None = None,
 ) -> Problem:
     """The regression problem of a recording, force and motion aligned.
 
     **Arguments:** `before`: a problem of the same motion and baseline, whose columns serve again if
     only the force has been shifted; `half_width` of the kernel, in samples, where the usual one is
-    too wide.
+    too wide; `start`: β from which the baseline is fitted, where they are known.
     """
     motion = motion_of(recording)
     evidence = gather(motion, half_width)
     if before is not None:
-        return _aligned(motion, evidence, structure, before.candidate_sets)
+        return _aligned(motion, evidence, structure, before.candidate_sets, before.start)
     candidates = CandidateSet(evidence, structure)
     try:
-        problem = _aligned(motion, evidence, structure, (candidates,))
+        problem = _aligned(motion, evidence, structure, (candidates,), start)
     except BaseException:
         candidates.close()
         raise
@@ -118,7 +121,8 @@ def realigned(recording: Recording | Motion, problem: Problem, known: Fit) -> Pr
     kernels = _taken_later(motion, *kernels, later)
     evidence, wide, delay = _aligned_by(motion, *kernels, later, known)
     structure, candidate_sets = problem.structure, problem.candidate_sets
-    return _assembled(motion, evidence, wide, structure, known, candidate_sets, delay, False)
+    again = _assembled(motion, evidence, wide, structure, known, candidate_sets, delay, False)
+    return again._replace(start=problem.start)
 
 
 def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem:
@@ -132,7 +136,7 @@ def across_reversals(recording: Recording | Motion, problem: Problem) -> Problem
     wide = _wider(motion, evidence, delay, True)
     structure, base, candidate_sets = problem.structure, problem.base, problem.candidate_sets
     across = _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, True)
-    return across._replace(in_slip=problem)
+    return across._replace(in_slip=problem, start=problem.start)
 
 
 def with_holdout(problem: Problem, holdout: Recording | Motion) -> Problem:
@@ -142,10 +146,11 @@ def with_holdout(problem: Problem, holdout: Recording | Motion) -> Problem:
     return problem._replace(held=held)
 
 
-def _aligned(motion, evidence: Evidence, structure, candidate_sets) -> Problem:
-    base = fit([structure], evidence)
+def _aligned(motion, evidence: Evidence, structure, candidate_sets, start) -> Problem:
+    base = fit([structure], evidence, [start])
     evidence, wide, delay = _aligned_by(motion, evidence, _wider(motion, evidence), 0.0, base)
-    return _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, False)
+    found = _assembled(motion, evidence, wide, structure, base, candidate_sets, delay, False)
+    return found._replace(start=start)
 
 
 def _aligned_by(

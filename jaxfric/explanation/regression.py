@@ -86,8 +86,8 @@ def fast(current: Fit) -> float:
 
 
 def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.ndarray]:
-    """Which affine parameters are forces of friction with a shape that is searched, `(p,)`; and
-    by how much each of the others adds to dry friction, `(p,)`.
+    """How much each affine parameter adds beside zero speed to a friction with a shape that is
+    searched, and to dry friction, `(p,)` each.
 
     Half of both directions: of motion in one, where nothing is known of it, a constant load is part
     of what seems to be friction.
@@ -102,20 +102,23 @@ def _friction(terms: Sequence[AbstractTerm], evidence) -> tuple[np.ndarray, np.n
 
 @cache
 def _bumps_and_dry(form: Any, shapes: tuple[tuple[int, ...], ...]) -> tuple[np.ndarray, ...]:
-    """Of the terms of one form, with leaves of those `shapes`: which columns are bumps, and half
-    the difference of the others beside zero velocity, for friction of velocity.
+    """Of the terms of one form, with leaves of those `shapes`: half the difference of each column
+    beside zero velocity, of those that are bumps of friction and of the others.
     """
     parts = summands(jax.tree.unflatten(form, [np.ones(shape) for shape in shapes]))
-    bumps = [
+    shaped = [
         part.coordinates == {"velocity"}
         and each.dimension == FORCE
         and any(number in changed for changed in changed_columns(part))
         for part in parts
         for number, each in enumerate(part.affine)
     ]
+    bumps = np.array(shaped, bool)
     slow = np.sqrt(np.finfo(jax.dtypes.canonicalize_dtype(float)).tiny) * np.array([1.0, -1.0])
-    dry = np.round(np.asarray(_half_difference(parts, slow)), 6)
-    return np.array(bumps, bool), np.where(bumps, 0.0, dry)
+    jumps = np.round(np.asarray(_half_difference(parts, slow)), 6)
+    # A power of speed begins at zero, and is a bump as well.
+    heights = np.where(jumps < 0, jumps, np.maximum(jumps, np.finfo(float).tiny))
+    return np.where(bumps, heights, 0.0), np.where(bumps, 0.0, jumps)
 
 
 @programs.compiled

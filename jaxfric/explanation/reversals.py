@@ -5,7 +5,7 @@ so that a row of the weak form across a reversal says nothing: its friction is t
 Under presliding it moves with that force, and then such a row is the best witness there is. The
 displacement decides, which needs neither a model of the encoder nor one of the controller. An axis
 may creep through zero, too, with a friction that is a steep function of the velocity, as most
-simulators have it: below the slowest speed that is told from rest nothing can be said of it.
+simulators have it. What of that is above the slowest speed that is told from rest shows in slip.
 """
 
 from collections.abc import Iterator
@@ -13,15 +13,11 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from ..data.recording import Recording
 from ..models import Model
 from ..signals.sampled import SampledSignal
-from ..terms import Dahl
-from ..terms.base import AbstractLaw
-from ..terms.sample import UNKNOWN, Parameter
-from ..units import FORCE, VELOCITY
+from ..terms import Dahl, SmoothCrossing
 from .evidence import Evidence
 from .motion import Motion, motion_of
 from .predictions import with_predictions
@@ -61,32 +57,23 @@ def yields(recording: Recording | Motion, evidence: Evidence, base: Fit) -> bool
     return bool(2 * BETWEEN * np.median(slopes) > count)
 
 
-class _Creep(AbstractLaw):
-    """Friction that is steep about zero velocity instead of a jump: F = F_c (tanh(v/v_c) − sign v).
+class _Crossing(SmoothCrossing):
+    """Down to a thousandth of the slowest slip, where it is a jump."""
 
-    `creep_velocity` v_c, m/s, up to a third of the slowest slip: there it is Coulomb friction but
-    for half a percent (tanh 3). Below a thousandth of the slowest slip it is a jump.
-    """
-
-    creep_velocity: Float[Array, ""] | float = UNKNOWN
-    affine: ClassVar = (Parameter("creep_force", FORCE),)
     nonlinear: ClassVar = (
-        Parameter("creep_velocity", VELOCITY, lambda s: (1e-3 * s.slowest, s.slowest / 3)),
+        SmoothCrossing.nonlinear[0]._replace(bounds=lambda s: (1e-3 * s.slowest, 0.5 * s.fastest)),
     )
-
-    def law(self, sample):
-        velocity = sample.velocity
-        return (jnp.tanh(velocity / self.creep_velocity) - jnp.sign(velocity),)
 
 
 def creeps(evidence: Evidence, base: Fit) -> bool:
-    """Whether rows across reversals show no more than a creep below the slowest slip.
+    """Whether rows across reversals show no more than friction that is steep in the velocity.
 
     It takes more of what the base leaves there than friction that builds up over a distance does.
     """
     seen = with_predictions(evidence, base)
     crept, elastic = (
-        fit((*base.terms, law), seen, (*base.betas, None), 6).energy for law in (_Creep(), Dahl())
+        fit((*base.terms, law), seen, (*base.betas, None), 6).energy
+        for law in (_Crossing(), Dahl())
     )
     return crept < elastic
 

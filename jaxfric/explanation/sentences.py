@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -29,15 +29,19 @@ def sentence(
     **Arguments:** `name` of the effect; `extent` of the recording, which some sentences depend on;
     `together`: the share of all findings, where others could stand in for a part of this one.
     """
-    effect = EFFECTS[name]
+    text = told(EFFECTS[name], parameters, extent)
+    all_ = "" if together is None else f" alone, {together:.0%} with the other findings"
+    return f"{text}; {unexplained(share)}{all_}{indistinct(rivals)}."
+
+
+def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NOWHERE) -> str:
+    """An effect with its values in words, without a full stop."""
     values = {n: float(estimate.value) for n, estimate in parameters.items()}
-    template = effect.variant(values, extent) or effect.sentence or name.replace("_", " ")
+    template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
-    text = re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
-    all_ = "" if together is None else f" alone, {together:.0%} with the other findings"
-    return f"{text}; {unexplained(share)}{all_}{indistinct(rivals)}."
+    return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
 
 
 def unexplained(share: float) -> str:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ..terms.base import AbstractTerm
 from ..terms.effect import Effect
 from .acceptance import LEAST_SHARE, accepted, needed
-from .contest import RIVAL, Contest, Finalist, Trial, contest
+from .contest import RIVAL, Contest, Finalist, Trial, contest, imitated
 from .evidence import Evidence
 from .intervals import left_out, left_out_again
 from .physical_constraints import constrained, nil, told_parts
@@ -107,9 +107,11 @@ def select(
         if first and selected:
             break
     if in_slip is not None and len(selected) == known and selected:
-        # No effect acts there, and the base fits these rows as well as it can.
-        betas = (problem.base.betas[0], *current.betas[1:])
-        current = fit(current.terms, evidence, betas, 6)
+        # No effect acts there, and the base fits these rows as well as it can: by its curve there
+        # or by that beside the terms, from which it may be far.
+        starts = (problem.base.betas[0], current.betas[0])
+        fits = (fit(current.terms, evidence, [b, *current.betas[1:]], 6) for b in starts)
+        current = min(fits, key=lambda each: each.energy)
     # Terms that were dropped again leave the base as it was, not as it was refitted on the way.
     last = current if selected else problem.base
     return Selection(problem.base, last, selected, round_.contest, in_slip=in_slip)
@@ -195,8 +197,13 @@ def _pruned(
     start = len(current.terms) - len(selected)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     for index in reversed(range(start, len(current.terms))):
-        less = without(current, evidence, index)
-        gain, trial = 1 - current.energy / less.energy, selected[index - start].trial
+        less, trial = without(current, evidence, index), selected[index - start].trial
+        if imitated(trial, current):
+            others = [i for i in range(len(current.terms)) if i != index]
+            betas = [None, *(current.betas[i] for i in others[1:])]
+            afresh = fit(less.terms, evidence, betas, 8)
+            less = min(less, afresh, key=lambda each: each.energy)
+        gain = 1 - current.energy / less.energy
         idle = trial.score(gain, size) <= 0 or gain < LEAST_SHARE
         if current.terms[index].stepped:
             idle |= left_out_again(current, evidence, block) >= less.energy

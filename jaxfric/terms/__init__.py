@@ -70,6 +70,7 @@ from .friction import (
     Gaussian as Gaussian,
     Generalised as Generalised,
     Lorentzian as Lorentzian,
+    SmoothCrossing as SmoothCrossing,
     Viscous as Viscous,
 )
 from .inertia import Inertia as Inertia, Offset as Offset

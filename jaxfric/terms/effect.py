@@ -206,6 +206,8 @@ class Effect:
     - `leftover`: strong effects leave something of its shape.
     - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
+    - `idealised`: models idealise it; what of it makes no more of the force than noise does is told
+      as a part of the baseline.
     - `several`: there may be more than one of it, as of two end stops.
     - `by_parameter`: its terms are of one parameter of the baseline each, and which, is told.
     - `composite`: it acts on every part of the force alike, so that effects of one part each may
@@ -256,6 +258,7 @@ class Effect:
     leftover: bool = False
     isolated: bool = False
     ubiquitous: bool = False
+    idealised: bool = False
     several: bool = False
     by_parameter: bool = False
     composite: bool = False

@@ -192,3 +192,33 @@ class Generalised(AbstractExponentialBump):
     def text(self, s, width, exponent):
         ratio = f"{s.call('abs', 'v')} / {width}"
         return _bump(s, s.call("exp", f"-{s.raised(ratio, exponent)}"))
+
+
+def _crossing_bounds(scales):
+    """From a third of the slowest slip, which lacks half a percent of a jump, to half the fastest.
+
+    A wider one is no longer told from viscous friction.
+    """
+    return scales.slowest / 3, 0.5 * scales.fastest
+
+
+class SmoothCrossing(AbstractLaw):
+    """What friction lacks that passes zero speed smoothly: F = −F_s (sign v − tanh(v/v_c)).
+
+    Beside a friction of F_s at zero speed that jumps, it makes F_s tanh(v/v_c) of the jump
+    (Andersson, Söderberg & Björklund 2007), as most simulators have it. At `crossing_velocity` v_c,
+    m/s, three quarters of F_s have built up.
+    """
+
+    crossing_velocity: Float[Array, ""] | float = UNKNOWN
+    affine: ClassVar = (Parameter("smoothed_force", FORCE),)
+    nonlinear: ClassVar = (Parameter("crossing_velocity", VELOCITY, _crossing_bounds),)
+
+    def law(self, sample: Sample):
+        # Not as a difference of nearly equal numbers.
+        fall = jnp.exp(-2 * jnp.abs(sample.velocity) / self.crossing_velocity)
+        return (-jnp.sign(sample.velocity) * 2 * fall / (1 + fall),)
+
+    def text(self, s, width):
+        fall = s.call("exp", f"-2.0 * {s.call('abs', 'v')} / {width}")
+        return (f"-2.0 * {s.call('sign', 'v')} * {fall} / (1.0 + {fall})",)
