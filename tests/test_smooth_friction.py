@@ -52,7 +52,10 @@ def test_the_law_makes_a_hyperbolic_tangent_of_a_jump():
 
 @settings(max_examples=40, deadline=None)
 @given(
-    force=st.floats(0.1, 10), bump=st.floats(0, 5), lacking=st.floats(-3, 30), seed=st.integers(0, 9)
+    force=st.floats(0.1, 10),
+    bump=st.floats(0, 5),
+    lacking=st.floats(-3, 30),
+    seed=st.integers(0, 9),
 )
 def test_friction_does_not_drive_whatever_it_lacks(force, bump, lacking, seed):
     """Of least squares no friction at rest is below zero, with what is taken off it."""

@@ -63,14 +63,12 @@ def with_idealised(found: Explanation, own: Idealised) -> Explanation:
     errors = (
         f"without it the force error is {100 * own.before:.3g} instead of {100 * own.after:.3g} %"
     )
-    remarks = [
-        Remark(
-            effect.name,
-            f"{told(effect, {name: found.baseline_parameters[name] for name in names})}. That makes "
-            f"no more of the force than the noise does ({errors}), and is a part of the baseline.",
-            False,
+    remarks = []
+    for effect, names in zip(own.effects, own.names, strict=True):
+        values = {name: found.baseline_parameters[name] for name in names}
+        text = (
+            f"{told(effect, values)}. That makes no more of the force than the noise does "
+            f"({errors}), and is a part of the baseline."
         )
-        for effect, names in zip(own.effects, own.names, strict=True)
-    ]
-    documents = [remark.to_dict() for remark in remarks]
-    return dataclasses.replace(found, warnings=[*found.warnings, *documents])
+        remarks.append(Remark(effect.name, text, False).to_dict())
+    return dataclasses.replace(found, warnings=[*found.warnings, *remarks])

@@ -33,7 +33,7 @@ class Problem(eqx.Module):
     @property
     def order(self) -> np.ndarray:
         """Where the parameters of each direction stand in β, where it has its own, `(2, d/2)`."""
-        sides, start = ([], []), 0
+        sides, start = (list[int](), list[int]()), 0
         for part in summands(self.term):
             if isinstance(part, Directional):
                 for own, side in zip(sides, (part.positive, part.negative), strict=True):

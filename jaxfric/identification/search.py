@@ -51,7 +51,8 @@ def _sides(term: AbstractTerm):
     sided = [t for t in terms if isinstance(t, Directional)]
     if not any(t.nonlinear for t in sided) or any(t.nonlinear for t in shared):
         return None
-    if any(jax.tree.structure(t.positive) != jax.tree.structure(t.negative) for t in sided):
+    ways = [(jax.tree.structure(t.positive), jax.tree.structure(t.negative)) for t in sided]
+    if any(forward != backward for forward, backward in ways):
         return None
     positive = Sum(tuple(leaf for t in sided for leaf in summands(t.positive)))
     return shared, positive

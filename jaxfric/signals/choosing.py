@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..data.excerpt import MOST, cut, excerpt, pieces
+from ..data.excerpt import cut, excerpt, pieces
 from ..data.recording import Recording
 from .noise import COLOURED
 from .polynomial import BLOCKS, DEGREES, HALF_WIDTHS, WIDE, Choice, weights
