@@ -51,8 +51,9 @@ def _sides(term: AbstractTerm):
     sided = [t for t in terms if isinstance(t, Directional)]
     if not any(t.nonlinear for t in sided) or any(t.nonlinear for t in shared):
         return None
-    ways = [(jax.tree.structure(t.positive), jax.tree.structure(t.negative)) for t in sided]
-    if any(forward != backward for forward, backward in ways):
+    if any(
+        len({jax.tree.structure(t.positive), jax.tree.structure(t.negative)}) > 1 for t in sided
+    ):
         return None
     positive = Sum(tuple(leaf for t in sided for leaf in summands(t.positive)))
     return shared, positive
