@@ -211,6 +211,8 @@ def test_matlab_structures_matrices_and_scalars(tmp_path):
         ("reference_velocity", None, None), ("target_torque", None, None), ("q_d", None, None),
         ("gear_temperature", None, None), ("mode", None, None), ("x_a", None, None),
         ("motor temperature", "temperature", None), ("seg", "segment", None),
+        ("neighbour_velocity", "neighbour_velocity", None),
+        ("neighborVelocity [rad/s]", "neighbour_velocity", "rad/s"),
     ],
 )  # fmt: skip
 def test_names(name, role, unit):

@@ -33,6 +33,7 @@ _SYNONYMS = {
     "load": "load payload loadmass normalload externalload",
     "temperature": "temperature temp",
     "segment": "segment seg segmentid segmentindex run runid trial episode",
+    "neighbour_velocity": "neighbourvelocity neighborvelocity",
 }
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
 _MEASURED = frozenset(

@@ -85,12 +85,14 @@ class Finalist(NamedTuple):
 class Contest(NamedTuple):
     """One round: every candidate on the grid, and the finalists refitted with the whole model.
 
-    `size`: how many independent values the residual is worth.
+    `size`: how many independent values the residual is worth; `unseen`: effects of which the model
+    imitates a law as a whole, so that this motion does not show it.
     """
 
     trials: list[Trial]
     finalists: list[Finalist]
     size: float
+    unseen: frozenset[str] = frozenset()
 
 
 def contest(
@@ -126,6 +128,7 @@ def contest(
         # stands out has been tested.
         scan = bootstrap(scaled(candidate.columns(seen)))
         trials.append(_trial(candidate, scan, 1 / (1 + DRAWS), np.inf))
+    unseen = frozenset(t.effect.name for t in trials if not t.dimension)
     trials = [t for t in trials if t.dimension]
     size = float(np.median([t.dimension / t.null_mean for t in trials]))
     trials.sort(key=lambda t: -t.score(t.gain, size))
@@ -135,7 +138,7 @@ def contest(
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
     finalists = _finals(seen, current, field, eligible, size, within_reach, refused)
-    return Contest(trials, finalists, size)
+    return Contest(trials, finalists, size, unseen)
 
 
 def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Trial:

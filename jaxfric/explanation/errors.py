@@ -12,7 +12,7 @@ from .baseline import at_values
 from .evidence import gather
 from .figures import Figures, cast
 from .findings import Findings, Solution
-from .improvement import Improved
+from .improvement import Improved, holdout_model
 from .locate import Structure
 from .mismatch import SURE
 from .motion import motion_of
@@ -62,6 +62,7 @@ def document(
         "holdout_values": refitted["values"],
         "simulation_error": None,
         "noise_floor": figures.floor(model, 2 * reach, tone),
+        "holdout_noise_floor": _held_floor(better.findings, figures, 2 * reach),
         "filtered_force_error": filtered["force_error"]
         | {
             "width": reach,
@@ -73,6 +74,13 @@ def document(
         "filtered_holdout_refitted_error": refitted["filtered"],
         "filtered_noise_floor": filtered["noise_floor"],
     }
+
+
+def _held_floor(findings: Findings, figures: Figures, lag: float) -> float | None:
+    """What noise alone makes on the held-out recording; `None` without one."""
+    if findings.problem.held is None:
+        return None
+    return figures.floor(holdout_model(findings), lag, where="held")
 
 
 def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:

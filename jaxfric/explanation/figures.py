@@ -147,22 +147,24 @@ class Figures:
             self._sampled[key] = Samples.of(self._left(model, "here"), force, time, counted)
         return self._sampled[key]
 
-    def floor(self, model: Model, lag: float, tone: Structure | None = None) -> float:
+    def floor(
+        self, model: Model, lag: float, tone: Structure | None = None, where: str = "here"
+    ) -> float:
         """The force error that noise alone makes, by samples of the residual `lag` seconds apart.
 
         What is so far apart differs by noise and by what changes faster (von Neumann 1941), but for
         a `tone`. No less than counts of the force make, and with what the loop makes of the
         encoder's, in bursts.
         """
-        recording = self._recordings["here"]
-        moving, force = self._samples("here", delay_of(model))
+        recording = self._recordings[where]
+        moving, force = self._samples(where, delay_of(model))
         steps = np.diff(np.asarray(recording.time, float)[moving])
         steps = some(steps, steps > 0)
         count = 1
         if steps.size:
             count = max(1, round(lag / float(np.median(steps, overwrite_input=True))))
         del steps
-        rest = self._left(model, "here")
+        rest = self._left(model, where)
         whole = relative(rest, force, moving)
         if tone is not None:
             rest = without(tone, rest, np.asarray(recording.time, float), moving)
@@ -178,6 +180,6 @@ class Figures:
         total = power(force, moving)
         alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
         counted = relative(rest, force, moving) * np.sqrt(
-            answered(rest, moving, self._motion("here"))
+            answered(rest, moving, self._motion(where))
         )
         return min(float(np.hypot(alone, counted)), whole)  # noise is no more than all of it

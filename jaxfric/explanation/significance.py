@@ -29,6 +29,9 @@ NEW = 0.02
 # A group that removes half of the residual would, its signs flipped, do nearly as well at the next
 # grid point: a tone that begins anew has a frequency close by. Then the remainder is flipped.
 MOSTLY = 0.5
+# One group without a grid that leaves less than a tenth of the amplitude is no chance either,
+# though a block or two hold it all: its signs flipped are then as large as it is.
+ALL = 0.99
 # Columns that are tested together: they fill the cache and no more.
 CHUNK = 64
 
@@ -72,7 +75,7 @@ class BlockBootstrap:
     def __call__(self, raw: np.ndarray, positive: bool = False) -> Scan:
         """Scan groups of columns, `(G, k, J)`; `positive`: single columns by that sign only."""
         scan = self._scan(raw, self.residual, positive)
-        if len(raw) == 1 or scan.gain[scan.best] < MOSTLY:
+        if scan.gain[scan.best] < (ALL if len(raw) == 1 else MOSTLY):
             return scan
         return self._by_remainder(scan, raw, positive)
 

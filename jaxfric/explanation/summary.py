@@ -27,7 +27,7 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
-from .wording import CONSTANT_APART, ELSEWHERE, HOLDS_MORE, OTHER, constant_apart
+from .wording import CONSTANT_APART, ELSEWHERE, HOLDS_MORE, HOLDS_OTHER, OTHER, constant_apart
 
 
 def summarise(
@@ -204,7 +204,7 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
         return [Remark(HOLDS_MORE, text, False)]
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "
-        f"{refitted:.0%} where the model is fitted to it: "
+        f"{refitted:.0%} where the model is fitted to that one: "
     )
     if constant := constant_apart(errors):
         text += f"a constant force of {constant} more acts there. {CONSTANT_APART}"
@@ -218,7 +218,7 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
             "other values hold there. The machine has changed, or this recording does not "
             "determine them: identify on one that moves like both."
         )
-    return [Remark("holdout_differs", text, False)]
+    return [Remark(HOLDS_OTHER, text, False)]
 
 
 def _not_visible(selection: Selection, units, absent: Sequence[str]) -> list[dict[str, Any]]:

@@ -191,7 +191,8 @@ def _vertex(times: np.ndarray, heights: np.ndarray) -> float:
 def _told_apart(undoing: _Undoing, guess: float, selected: SelectedTerm, size: float) -> LateForce:
     """A delay or a lag of about `guess`, s, whichever leaves less of `size` independent values.
 
-    Several lags in a row are neither: both take nearly all of it then, and either may be meant.
+    Several lags in a row are neither: both take nearly all of it then, and either may be meant. So
+    may a lag of second order, whose corner is above what the recording excites.
     """
     problem = undoing.problem
     ways = alike(selected.effect)
@@ -202,7 +203,12 @@ def _told_apart(undoing: _Undoing, guess: float, selected: SelectedTerm, size: f
     as_it_is = undoing.rest(None, 0.0)
     score = 0.5 * size * np.log(float(as_it_is @ as_it_is) / energy)
     nearly = max(RIVAL, (1 - NO_EVIDENCE) * score)
-    near = (name for name, gap in others.items() if gap < nearly)
+    near = [name for name, gap in others.items() if gap < nearly]
+    for each in [EFFECTS[name] for name in others if name not in near]:
+        forms = [dataclasses.replace(each, undone=form) for form in each.also_undone]
+        left = min((undoing.least(form, time)[0] for form in forms), default=np.inf)
+        if 0.5 * size * np.log(left / energy) < nearly:
+            near.append(each.name)
     rivals = (*near, *(r for r in selected.rivals if r != best.name and r not in others))
     wide = time
     if problem.wide is not None:

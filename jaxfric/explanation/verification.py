@@ -231,13 +231,14 @@ def smallest_visible(contest: Contest, current: Fit) -> dict[str, float]:
     """The smallest force, N rms in slip, of each effect that would have been found, by effect.
 
     A term is selected if its R² is above that of the highest of all draws and above
-    `LEAST_SHARE`; the least of an effect's laws counts, and of its shapes nine of ten.
+    `LEAST_SHARE`; the least of an effect's laws counts, and of its shapes nine of ten. Of an effect
+    one of whose laws this motion does not show there is no such size.
     """
     level = float(np.sqrt(current.energy / len(current.residual)))
     found: dict[str, float] = {}
     for trial in contest.trials:
         least = max(LEAST_SHARE, trial.threshold)
-        if not np.isfinite(least):
+        if not np.isfinite(least) or trial.effect.name in contest.unseen:
             continue
         size = level * np.sqrt(least) / max(trial.new_part, 1e-3)
         name = trial.effect.name

@@ -60,7 +60,9 @@ def summary(
     hums = any(each["name"] == FAST_TONE for each in warnings)
     errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
-    return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit))])
+    told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
+    more = [] if told else _more_there(fit, verdict)
+    return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit) or more)])
 
 
 def _not_confirmed(findings: Sequence[Finding]) -> str:
@@ -83,6 +85,9 @@ def _errors(fit: Mapping[str, Any], found: bool) -> str:
         text += f"; on the held-out recording{adjusted(fit)} {said(held)}"
     if (floor := fit.get("noise_floor")) is not None and math.isfinite(floor):
         text += f"; {floor:.2%} is what noise alone makes"
+        there = fit.get("holdout_noise_floor")
+        if held and there is not None and held["after"] > ELSEWHERE * floor:
+            text += f", and {there:.2%} there" * math.isfinite(there)
     return text
 
 
@@ -141,6 +146,8 @@ ELSEWHERE = 2.0
 OTHER = 0.5
 # The warning of one in which something acts that does not act in the recording itself.
 HOLDS_MORE = "holdout_holds_more"
+# That of one for which other values hold.
+HOLDS_OTHER = "holdout_differs"
 
 
 def _found_of(fit: Mapping[str, Any]) -> float:
@@ -161,7 +168,7 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
     through = f"{fit['filtered_holdout_force_error']['after']:.2%}"
     text = (
         f"But through the search's filter {through} of the held-out force is left, and "
-        f"{refitted:.2%} where the model is fitted to it: "
+        f"{refitted:.2%} where the model is fitted to that one: "
     )
     if constant := constant_apart(fit):
         return [f"{text}there a constant force of {constant} more acts. {CONSTANT_APART}"]
@@ -224,6 +231,23 @@ def _of_a_moment(findings: Sequence[Finding], fit: Mapping[str, Any]) -> list[st
     return [
         f"But {' and '.join(names)} need not recur, and most of what the held-out recording shows "
         f"is left, {pairs[1]['after']:.2%}: explain that one by itself."
+    ]
+
+
+def _more_there(fit: Mapping[str, Any], verdict: str) -> list[str]:
+    """That nothing is missing here, but the held-out recording is left with more than its noise."""
+    floors = fit.get("noise_floor"), fit.get("holdout_noise_floor")
+    if verdict != "consistent" or not all(floor and math.isfinite(floor) for floor in floors):
+        return []
+    here, held = (
+        fit[name]["after"] / floor
+        for name, floor in zip(("force_error", "holdout_force_error"), floors, strict=True)
+    )
+    if held < ELSEWHERE * max(here, 1.0):
+        return []
+    return [
+        "But the held-out recording is left with more than its noise: something shows there that "
+        "does not show here. Explain that one, with this one held out."
     ]
 
 

@@ -223,7 +223,8 @@ class Effect:
     - `outstanding`: laws that the residual itself suggests; `parts`: such a law of some of its
       affine parameters alone, by their numbers, where each is a force by itself.
     - `undone`: the recording with the force where it belongs, for a force that is late by a time,
-      s; `shift`: the parameter by which a prediction takes the force later, if by the whole of it.
+      s; `also_undone`: the same for other forms of it, which it may be as well; `shift`: the
+      parameter by which a prediction takes the force later, if by the whole of it.
     - `logged`: it is in the log alone, and what moves has none of it: a force is recorded late.
 
     How it is told:
@@ -270,6 +271,7 @@ class Effect:
     outstanding: Callable[[Residual], Iterator[AbstractTerm]] = _nothing
     parts: Callable[[Any, Sequence[int]], AbstractTerm] | None = None
     undone: Callable[[Recording, float], Recording] | None = None
+    also_undone: tuple[Callable[[Recording, float], Recording], ...] = ()
     shift: str = ""
     logged: bool = False
     variant: Callable[[Mapping[str, float], Extent], str | None] = _no_variant

@@ -81,6 +81,19 @@ def lagged(motion: Recording, lag: float) -> Recording:
     return dataclasses.replace(motion, force=jnp.asarray(through))
 
 
+def lagged_twice(motion: Recording, lag: float) -> Recording:
+    """The force through 1/(1 + T s + T² s²/2): a current loop tuned to the magnitude optimum
+    (Kessler 1955), which to second order is a delay of T.
+    """
+    force, pole = np.asarray(motion.force), lag * (0.5 + 0.5j)
+
+    def through(part):
+        once = _through(motion, np.asarray(part, complex), pole)
+        return _through(motion, once, pole.conjugate()).real
+
+    return dataclasses.replace(motion, force=jnp.asarray(at_other_times(motion, force, through)))
+
+
 def recorded_earlier(motion: Recording, delay: float) -> Recording:
     """The force taken `delay`, s, earlier: what acted when it was recorded."""
     return earlier(motion, -delay)
@@ -101,7 +114,7 @@ def unfiltered(motion: Recording, lag: float) -> Recording:
     return dataclasses.replace(motion, force=jnp.asarray(at_other_times(motion, force, before)))
 
 
-def _through(motion: Recording, force: np.ndarray, lag: float) -> np.ndarray:
+def _through(motion: Recording, force: np.ndarray, lag: complex) -> np.ndarray:
     time = np.asarray(motion.time)
     step = np.diff(time, prepend=time[0])
     keep = np.exp(-np.clip(step, 0.0, None) / lag)
@@ -150,6 +163,7 @@ ACTUATOR_LAG = Effect(
     delays=True,
     leftover=True,
     undone=lagged,
+    also_undone=(lagged_twice,),
 )
 
 CLOCK = Effect(

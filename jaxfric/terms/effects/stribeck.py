@@ -1,9 +1,11 @@
 """Friction that falls with speed."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..base import Directional
-from ..effect import Effect, View, even
+from ..effect import Effect, Extent, View, even
 from ..friction import Exponential, Gaussian, Generalised, Lorentzian
 
 # Exponents of a bump beside those that have a law of their own, 1 and 2: from 1/2 on (Bo &
@@ -17,6 +19,17 @@ def bumps(term: Directional, view: View) -> np.ndarray:
         return even(term, view)
     speeds = even(Exponential(), view)[:, 0]
     return np.array([(v, n, v, n) for n in _EXPONENTS for v in speeds])
+
+
+def _rising(values: Mapping[str, float], extent: Extent) -> str | None:
+    """Of a bump upside down."""
+    if any(value > 0 for name, value in values.items() if name.startswith("stribeck_force")):
+        return None
+    return (
+        "Friction rises with speed at low velocity: a Stribeck bump upside down, of "
+        "{stribeck_force+} forward and {stribeck_force-} backward, over {stribeck_velocity+} and "
+        "{stribeck_velocity-}"
+    )
 
 
 STRIBECK = Effect(
@@ -34,5 +47,6 @@ STRIBECK = Effect(
     separate_by="Hold several constant slow speeds: a Stribeck curve stays, a transient goes.",
     positive=True,
     grid=bumps,
+    variant=_rising,
     sizes=("stribeck_force",),
 )
