@@ -60,7 +60,8 @@ POSITION_DEPENDENT_INERTIA = Effect(
     coordinates=("position_by_acceleration",),
     needs=frozenset({"position"}),
     confusable_with=("gravity_unbalance", "position_dependent_force_constant"),
-    separate_by="Cross the stroke at two accelerations: a weight does not scale with them.",
+    separate_by="Cross the stroke at two accelerations: a weight does not scale with them. A "
+    "position that is off once a turn, by an encoder off centre, does: compare a second sensor.",
     grid=periods,
     variant=slowly("inertia_period", "Inertia varies slowly along the stroke, by {amplitude}"),
 )

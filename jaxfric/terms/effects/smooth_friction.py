@@ -20,4 +20,6 @@ SMOOTH_FRICTION = Effect(
     positive=True,
     idealised=True,
     sizes=("smoothed_force",),
+    # How dry friction passes zero is drawn of every machine.
+    drawn=False,
 )
