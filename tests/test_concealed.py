@@ -55,6 +55,7 @@ def expected_noise(machine):
 # of saturation; machines whose mass or gain changes while they run are not drawn yet:
 # tests/test_moments.py plants those.
 NOT_DRAWN = {
+    "smooth_friction",
     "parameter_mismatch",
     "position_zero",
     "force_limit",
