@@ -51,8 +51,8 @@ def expected_noise(machine):
     return float(np.hypot(machine.noise.force, machine.noise.process))
 
 
-# A wrong parameter and a zero belong to a model, not to a machine, and a hard limit is a definition
-# of saturation; machines whose mass or gain changes while they run are not drawn yet:
+# A wrong parameter and a zero belong to a model, not to a machine, a hard limit is a definition of
+# saturation, and how friction passes zero is drawn of every machine; machines whose mass or gain changes while they run are not drawn yet:
 # tests/test_moments.py plants those.
 NOT_DRAWN = {
     "smooth_friction",
