@@ -52,8 +52,8 @@ def expected_noise(machine):
 
 
 # A wrong parameter and a zero belong to a model, not to a machine, a hard limit is a definition of
-# saturation, and how friction passes zero is drawn of every machine; machines whose mass or gain changes while they run are not drawn yet:
-# tests/test_moments.py plants those.
+# saturation, and how friction passes zero is drawn of every machine; machines whose mass or gain
+# changes while they run are not drawn yet: tests/test_moments.py plants those.
 NOT_DRAWN = {
     "smooth_friction",
     "parameter_mismatch",
