@@ -31,6 +31,7 @@ from .parsimony import instead
 from .problem import Problem, problem_of, with_holdout
 from .rivals import NO_EVIDENCE
 from .search import at_given, nothing, obeying, searched
+from .slow_curve import at_slow_speeds
 from .summary import facts, summarise, tone_left
 from .uncertainty import estimated
 
@@ -154,6 +155,7 @@ def _explain(
         wrong, better = _known_there(known, wrong, better, inputs)
     else:
         remarks += zero.integrated(better.findings, None)
+    better = at_slow_speeds(known, better, inputs.figures)
     doing("locating what is left")
     wrong = wrong if better.refitted else None
     explanation = summarise(recording, better, known, wrong, inputs.figures, remarks, seed)

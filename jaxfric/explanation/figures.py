@@ -77,6 +77,20 @@ class Figures:
         """What the model leaves of each part of the samples of a figure, N², `(PARTS,)`."""
         return self._figure(model, where, delay)[1]
 
+    def in_slip(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Velocity and what the model leaves of the samples in slip, and their parts of the record,
+        `(C,)` each; `None` of a long recording.
+        """
+        if self._recordings["here"].num_samples > MOST:
+            return None
+        moving, _ = self._samples("here", delay_of(model))
+        left, motion = self._left(model, "here"), self._motion("here").recording
+        velocity = np.asarray(motion.velocity, float)[: len(left)]
+        slips = moving & np.isfinite(velocity) & np.isfinite(left)
+        slips &= np.abs(velocity) > float(signals.host_scales(motion)[0].slowest)
+        count = int(np.count_nonzero(slips))
+        return velocity[slips], left[slips], np.arange(count) * PARTS // max(count, 1)
+
     def _figure(self, model: Model, where: str, delay: float | None) -> tuple[float, np.ndarray]:
         """A figure and its parts, computed once."""
         delay = delay_of(model) if delay is None else delay

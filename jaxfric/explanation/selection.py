@@ -1,9 +1,11 @@
 """What a search selects: terms on top of the base, with what each could be instead."""
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ..data.recording import Recording
+from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..terms.effect import Effect
 from .contest import Contest, Trial
@@ -46,6 +48,7 @@ class Selection(NamedTuple):
     - `given`: the base with its own values, where these stay but for `free`, numbers of its
       parameters.
     - `trusted`: whether these values are taken as exact, since a term stands in for wrong ones.
+    - `curve`: parameters of the base's friction that are of the samples and not of the rows.
     - `undone`: puts back the force of a recording, where it acts late; `time_error`: of that time,
       by smoothing and sampling, s.
     """
@@ -59,6 +62,7 @@ class Selection(NamedTuple):
     given: Model | None = None
     free: tuple[int, ...] = ()
     trusted: bool = False
+    curve: Mapping[str, Estimate] = MappingProxyType({})
     undone: Callable[[Recording], Motion] | None = None
 
     @property

@@ -159,7 +159,7 @@ def _values(better: Improved, wrong: Mismatch | None, units) -> dict[str, Estima
     if wrong is not None:
         return estimated(better.findings, wrong.moved)[0]
     problem, selection = better.findings.recorded
-    return spelled.estimates(selection.last, problem.block, units)[0]
+    return spelled.estimates(selection.last, problem.block, units)[0] | dict(selection.curve)
 
 
 def _doubts(better: Improved) -> list[Remark]:
