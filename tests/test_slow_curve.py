@@ -1,15 +1,19 @@
 """A friction curve at speeds that no row holds is that of the samples."""
 
+import dataclasses
 import types
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxfric as jf
 from jaxfric import models
 from jaxfric.explanation import slow_curve
-from jaxfric.explanation.figures import PARTS
+from jaxfric.explanation.figures import PARTS, InSlip
 from jaxfric.explanation.regression import Fit
-from jaxfric.terms import Inertia
+from jaxfric.terms import Cogging, Inertia
 from jaxfric.terms.sample import Scales
 
 SLOWEST, FASTEST = 2e-3, 0.3
@@ -48,9 +52,8 @@ def identified(bump, width, own, seed=0, noise=0.3):
     numbers = SLOWEST, FASTEST, -0.1, 0.1, 25.0, 0.0, 30.0, 1e-3, 80.0
     evidence = types.SimpleNamespace(limits=Scales(*numbers), peak=80.0)
     places = slow_curve._friction(last)
-    return slow_curve._identified(
-        last, places, velocity[slips], left[slips], part[slips], evidence
-    ), places
+    samples = InSlip(velocity[slips], left[slips], left[slips], part[slips])
+    return slow_curve._identified(last, places, samples, evidence)[0], places
 
 
 @pytest.mark.parametrize("own", [(0.1, 0.05), (30.0, 0.0021)])
@@ -79,3 +82,43 @@ def test_only_functions_of_the_velocity_are_friction():
     assert slow_curve._friction(rigid) is None
     straight = models.coulomb_viscous()
     assert slow_curve._friction(last._replace(terms=(straight,))) is None
+
+
+def record(seed, size=0.04, width=0.006):
+    """Quick strokes of an axis with a narrow Stribeck bump and a cogging; slow ones of another."""
+    time = np.arange(20000) / 1000.0
+    draw, slow = np.random.default_rng(seed), 0.08 if seed else 1.0
+    rates = 2 * np.pi * slow * np.array([0.7, 1.3, 2.1])
+    phases = draw.uniform(0, 2 * np.pi, 3)
+    x = sum(np.sin(w * time + p) / w for w, p in zip(rates, phases, strict=True)) * size * slow
+    structure = models.gaussian() + Cogging(0.011)
+    values = {"coulomb": 20.0, "viscous": 60.0, "stribeck_force": 8.0, "stribeck_velocity": width}
+    known = {f"{name}{sign}": value for name, value in values.items() for sign in "+-"}
+    machine = models.from_parameters(
+        structure, known | {"inertia": 5.0, "cogging_sin": 1.0, "cogging_cos": 1.5}
+    )
+    channels = {
+        "reference": jnp.asarray(x),
+        "reference_velocity": jnp.asarray(np.gradient(x, time)),
+    }
+    clock = jf.Recording(time, np.zeros_like(time), x, np.gradient(x, time), channels=channels)
+    run = jf.simulate(
+        machine, clock, jf.PD(kp=5.0 * 60**2, kd=2 * 5.0 * 60), substeps=16, force_noise=0.3,
+        encoder=jf.Encoder(resolution=1e-7), key=jax.random.key(seed),
+    )  # fmt: skip
+    return dataclasses.replace(run, channels={}, velocity=None)
+
+
+@pytest.mark.slow
+def test_quick_strokes_tell_what_holds_in_slow_ones():
+    quick, slow = record(0), record(1)
+    found = jf.explain(quick, holdout=slow)
+    assert [finding.effect for finding in found.findings] == ["cogging"]
+    for sign in "+-":
+        low, high = found.baseline_parameters[f"stribeck_force{sign}"].interval()
+        assert low < 8.0 < high and high - low < 8.0
+        assert float(found.model.parameters[f"stribeck_force{sign}"]) == pytest.approx(
+            float(found.baseline_parameters[f"stribeck_force{sign}"].value)
+        )
+    # Through the rows alone 15 % is left there.
+    assert found.fit["holdout_force_error"]["after"] < 0.05

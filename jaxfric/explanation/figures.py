@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Collection, Hashable
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,10 +15,12 @@ from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..models import Model
 from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
-from ..simulation.prediction import Prepared
+from ..simulation.prediction import Prepared, force_along
+from ..terms.base import AbstractTerm
 from .beyond import Samples, without
 from .counts import answered
 from .locate import Structure
+from .predictions import PREDICTED
 
 # Parts of a record that are compared: none shares more than its ends with another.
 PARTS = 16
@@ -31,6 +34,22 @@ def cast(tree, dtype=float):
         return jnp.asarray(np.asarray(leaf), dtype) if inexact else leaf
 
     return tree if isinstance(tree, str) else jax.tree.map(one, tree)
+
+
+def _of_inertia(term: AbstractTerm) -> bool:
+    """Whether a term is of the motion alone and has momentum."""
+    return term.inertial and not term.coordinates & PREDICTED
+
+
+class InSlip(NamedTuple):
+    """Samples in slip, `(C,)` each: velocity, m/s, what a model leaves of the force, N, the same by
+    the difference of neighbouring velocities for the acceleration, and the part of the record.
+    """
+
+    velocity: np.ndarray
+    left: np.ndarray
+    rough: np.ndarray
+    part: np.ndarray
 
 
 class Figures:
@@ -77,19 +96,27 @@ class Figures:
         """What the model leaves of each part of the samples of a figure, N², `(PARTS,)`."""
         return self._figure(model, where, delay)[1]
 
-    def in_slip(self, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Velocity and what the model leaves of the samples in slip, and their parts of the record,
-        `(C,)` each; `None` of a long recording.
-        """
+    def in_slip(self, model: Model) -> InSlip | None:
+        """The samples in slip; `None` of a long recording."""
         if self._recordings["here"].num_samples > MOST:
             return None
         moving, _ = self._samples("here", delay_of(model))
-        left, motion = self._left(model, "here"), self._motion("here").recording
-        velocity = np.asarray(motion.velocity, float)[: len(left)]
-        slips = moving & np.isfinite(velocity) & np.isfinite(left)
+        left, prepared = self._left(model, "here"), self._motion("here")
+        inertia, motion, count = self.own(model).only(_of_inertia), prepared.recording, len(left)
+        with jax.enable_x64(self.x64):
+            rest, momentum, smooth = (
+                np.asarray(each, float)[:count]
+                for each in (
+                    inertia.force(motion), inertia.momentum(motion), force_along(inertia, prepared)
+                )
+            )  # fmt: skip
+        time, velocity = (np.asarray(x, float)[:count] for x in (motion.time, motion.velocity))
+        rough = left + smooth - rest - np.gradient(momentum, time)
+        slips = moving & np.isfinite(velocity) & np.isfinite(left) & np.isfinite(rough)
         slips &= np.abs(velocity) > float(signals.host_scales(motion)[0].slowest)
-        count = int(np.count_nonzero(slips))
-        return velocity[slips], left[slips], np.arange(count) * PARTS // max(count, 1)
+        many = int(np.count_nonzero(slips))
+        part = np.arange(many) * PARTS // max(many, 1)
+        return InSlip(velocity[slips], left[slips], rough[slips], part)
 
     def _figure(self, model: Model, where: str, delay: float | None) -> tuple[float, np.ndarray]:
         """A figure and its parts, computed once."""

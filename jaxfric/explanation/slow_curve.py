@@ -18,7 +18,8 @@ from ..terms.sample import Scales
 from . import parameters as spelled
 from .baseline import Baseline
 from .evaluation import PAIR, evaluate
-from .figures import PARTS, Figures
+from .evidence import Evidence
+from .figures import PARTS, Figures, InSlip
 from .findings import Findings, Solution, alone
 from .improvement import CHANCE, Improved, force_errors
 from .least_squares import solve
@@ -89,17 +90,23 @@ def at_slow_speeds(known: Baseline, better: Improved, figures: Figures) -> Impro
     effects = [each.effect for each in selection.selected]
     if known.model is not None or known.fit is not None or better.refitted:
         return better
+    if selection.given is not None:
+        return better
     if findings.problem.reversals or any(e.at_reversals or e.late for e in effects):
         return better
     places = _friction(selection.last)
-    motion = figures.in_slip(findings.model(selection.last))
-    if places is None or motion is None:
+    samples = figures.in_slip(findings.model(selection.last))
+    if places is None or samples is None:
         return better
-    found = _identified(selection.last, places, *motion, findings.problem.evidence)
+    evidence = findings.problem.evidence
+    found, rough = _identified(selection.last, places, samples, evidence)
     if found is None:
         return better
     last = _with_friction(selection.last, places, found, findings)
-    values = spelled.estimates(found, _EVERY, findings.problem.evidence.motion.unit_names)[0]
+    values, others = (
+        spelled.estimates(each, _EVERY, evidence.motion.unit_names)[0] for each in (found, rough)
+    )
+    values = {name: _as_known(own, others[name]) for name, own in values.items()}
     less = _instead(better, last, values)
     after = force_errors(less.findings, figures)
     if after.here >= better.after.here:
@@ -133,13 +140,28 @@ def _friction(last: Fit) -> _Places | None:
     return _Places(Sum(tuple(terms)), affine, nonlinear) if nonlinear else None
 
 
-def _identified(last: Fit, places: _Places, velocity, left, part, evidence) -> Fit | None:
-    """Friction fitted to the samples without what all else makes; `None` where that is no better.
+def _as_known(own: Estimate, rough: Estimate) -> Estimate:
+    """A value that depends on how the acceleration is taken is known no better than that.
 
-    `left`: what the model leaves of each sample in slip, N, `(C,)`; `part` of the record.
+    Where friction changes its sign the acceleration jumps, and a smoothed one errs by the speed's
+    own sign; the difference of neighbouring velocities is rough, and misses the moment by a sample.
     """
+    error = np.hypot(own.standard_error, own.value - rough.value)
+    return own._replace(standard_error=np.float64(error))
+
+
+def _identified(
+    last: Fit, places: _Places, samples: InSlip, evidence: Evidence
+) -> tuple[Fit, Fit] | tuple[None, None]:
+    """Friction fitted to the samples without what all else makes, and the same by the other
+    acceleration; `None` where that is no better.
+    """
+    velocity, left, rough, part = samples
     beta, alpha = last.betas[0][places.nonlinear], last.alphas[0][places.affine]
-    bins = Bins.of(velocity, left, part, evidence.limits, evidence.peak).sorted_by_part()
+    bins, other = (
+        Bins.of(velocity, each, part, evidence.limits, evidence.peak).sorted_by_part()
+        for each in (left, rough)
+    )
     own = bins.columns(places.term, beta[None])[0] @ alpha
     bins = bins._replace(target=bins.target + own)
     fits = [fit([places.term], bins, [start]) for start in (beta, None)]
@@ -150,7 +172,9 @@ def _identified(last: Fit, places: _Places, velocity, left, part, evidence) -> F
     # More than the price of its parameters (Schwarz 1978), in the noise of a bin.
     count, many = len(alpha) + len(beta), int(np.count_nonzero(bins.weight))
     price = count * np.log(many) * best.energy / max(many - count, 1)
-    return best if sure and np.sum(gained) > price else None
+    if not sure or np.sum(gained) <= price:
+        return None, None
+    return best, fit([places.term], other._replace(target=other.target + own), best.betas)
 
 
 def _with_friction(last: Fit, places: _Places, found: Fit, findings: Findings) -> Fit:
