@@ -115,8 +115,9 @@ def test_quick_strokes_tell_what_holds_in_slow_ones():
     found = jf.explain(quick, holdout=slow)
     assert [finding.effect for finding in found.findings] == ["cogging"]
     for sign in "+-":
+        # The rows alone know it to some 60 N forward, and to 13 backward.
         low, high = found.baseline_parameters[f"stribeck_force{sign}"].interval()
-        assert low < 8.0 < high and high - low < 8.0
+        assert low < 8.0 < high and high - low < 10.0
         assert float(found.model.parameters[f"stribeck_force{sign}"]) == pytest.approx(
             float(found.baseline_parameters[f"stribeck_force{sign}"].value)
         )
