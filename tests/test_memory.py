@@ -64,6 +64,14 @@ def test_samples_at_the_end_that_are_not_valid_do_not_matter_to_a_long_recording
     np.testing.assert_allclose(velocity[inside], 0.12 * np.cos(4 * time[inside]), atol=5e-4)
 
 
+def test_a_recording_without_samples_is_whole():
+    none = np.zeros(0)
+    recording = jf.Recording(time=none, force=none, velocity=none)
+    assert excerpt(recording) is recording
+    with pytest.raises(ValueError):
+        jf.identify(jf.models.gaussian(), recording)
+
+
 def test_a_recording_of_usual_length_is_whole():
     recording = jf.Recording(time=np.arange(MOST), force=np.zeros(MOST), velocity=np.zeros(MOST))
     assert excerpt(recording) is recording

@@ -1,7 +1,6 @@
 """A friction curve at speeds that no row holds is that of the samples."""
 
 import dataclasses
-import types
 
 import jax
 import jax.numpy as jnp
@@ -50,10 +49,11 @@ def identified(bump, width, own, seed=0, noise=0.3):
     left = shape(bump, width) - shape(*own)
     left += noise * np.random.default_rng(seed).standard_normal(len(left))
     numbers = SLOWEST, FASTEST, -0.1, 0.1, 25.0, 0.0, 30.0, 1e-3, 80.0
-    evidence = types.SimpleNamespace(limits=Scales(*numbers), peak=80.0)
     places = slow_curve._friction(last)
-    samples = InSlip(velocity[slips], left[slips], left[slips], part[slips])
-    return slow_curve._identified(last, places, samples, evidence)[0], places
+    samples = InSlip(velocity[slips], left[slips], part[slips])
+    return slow_curve.fitted(
+        last, places, slow_curve.Bins.of(samples, Scales(*numbers), 80.0)
+    ), places
 
 
 @pytest.mark.parametrize("own", [(0.1, 0.05), (30.0, 0.0021)])
@@ -115,11 +115,13 @@ def test_quick_strokes_tell_what_holds_in_slow_ones():
     found = jf.explain(quick, holdout=slow)
     assert [finding.effect for finding in found.findings] == ["cogging"]
     for sign in "+-":
-        # The rows alone know it to some 60 N forward, and to 13 backward.
+        # The rows alone know it to some 60 N forward, and to 13 backward; by the velocity half a
+        # sample beside the force it would be 9 or 10 N.
         low, high = found.baseline_parameters[f"stribeck_force{sign}"].interval()
-        assert low < 8.0 < high and high - low < 10.0
+        assert low < 8.0 < high and high - low < 2.5
         assert float(found.model.parameters[f"stribeck_force{sign}"]) == pytest.approx(
             float(found.baseline_parameters[f"stribeck_force{sign}"].value)
         )
-    # Through the rows alone 15 % is left there.
-    assert found.fit["holdout_force_error"]["after"] < 0.05
+    # By the rows alone 15 % is left there.
+    errors = found.fit["holdout_force_error"]
+    assert errors["after"] < 1.2 * found.fit["holdout_noise_floor"]

@@ -41,7 +41,7 @@ def pieces(mask: np.ndarray, most: int = MOST) -> list[slice]:
     that are not valid.
     """
     count = len(mask)
-    if not mask[-1]:  # what a recording is padded with decides nothing
+    if count and not mask[-1]:  # what a recording is padded with decides nothing
         count = int(np.max(np.flatnonzero(mask), initial=-1)) + 1
     if count <= SPARE * most:
         return [slice(0, len(mask))]

@@ -3,7 +3,7 @@
 import copy
 import dataclasses
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from typing import Any
 
@@ -42,6 +42,20 @@ def evaluate(term: AbstractTerm, betas: np.ndarray, motion: Recording):
     if len(read) < len(motion.channels):
         motion = _with_fields(motion, {"channels": read})
     return _compiled(form, betas, np.asarray(numbers, betas.dtype), motion)
+
+
+def in_batches(
+    term: AbstractTerm, betas: np.ndarray, motion: Recording
+) -> Iterator[tuple[np.ndarray, np.ndarray | None]]:
+    """As [`evaluate`][] at many β, `(G, d)`, of some of them at a time: temporaries stay small."""
+    few, most = sizes(term)
+    for start in range(0, len(betas), most):
+        some = betas[start : start + most]
+        size = few if len(some) <= few else most
+        full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
+        plain, momentum = evaluate(term, full, motion)
+        momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
+        yield np.asarray(plain)[: len(some)], momentum
 
 
 def sizes(term: AbstractTerm) -> tuple[int, int]:

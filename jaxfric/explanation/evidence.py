@@ -19,7 +19,7 @@ from ..data.recording import Recording
 from ..terms import KNOWN_FORCE, KNOWN_MOMENTUM, KNOWN_REST, KnownColumns
 from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
-from .evaluation import BATCH, PAIR, evaluate, sizes
+from .evaluation import BATCH, PAIR, evaluate, in_batches
 from .motion import Motion, derived, motion_of
 from .nodes import NODES, averaged, node_signals, padded, stride, windows
 
@@ -92,15 +92,7 @@ class Evidence(NamedTuple):
             return np.concatenate(apart, axis=2)
         if term.switched is not None:
             return self._switched(term, betas)
-        parts = []
-        few, most = sizes(term)
-        for start in range(0, len(betas), most):
-            some = betas[start : start + most]
-            size = few if len(some) <= few else most
-            full = np.concatenate([some, np.repeat(some[-1:], size - len(some), axis=0)])
-            plain, momentum = evaluate(term, full, self.read_by(term))
-            momentum = None if momentum is None else np.asarray(momentum)[: len(some)]
-            parts.append(self.project(np.asarray(plain)[: len(some)], momentum))
+        parts = [self.project(*both) for both in in_batches(term, betas, self.read_by(term))]
         return np.concatenate(parts).transpose(0, 2, 1)
 
     def read_by(self, term: AbstractTerm) -> Recording:

@@ -13,9 +13,10 @@ from .. import signals
 from ..data.cleaning.pieces import some
 from ..data.excerpt import MOST
 from ..data.recording import Recording
+from ..data.shifting import shifted
 from ..models import Model
 from ..simulation.errors import delay_of, in_motion, power, relative, residual, unseen
-from ..simulation.prediction import Prepared, force_along
+from ..simulation.prediction import Prepared, inertial
 from ..terms.base import AbstractTerm
 from .beyond import Samples, without
 from .counts import answered
@@ -42,13 +43,12 @@ def _of_inertia(term: AbstractTerm) -> bool:
 
 
 class InSlip(NamedTuple):
-    """Samples in slip, `(C,)` each: velocity, m/s, what a model leaves of the force, N, the same by
-    the difference of neighbouring velocities for the acceleration, and the part of the record.
+    """Samples in slip, `(C,)` each: velocity, m/s, what a model leaves of the force, N, and the
+    part of the record.
     """
 
     velocity: np.ndarray
     left: np.ndarray
-    rough: np.ndarray
     part: np.ndarray
 
 
@@ -96,27 +96,42 @@ class Figures:
         """What the model leaves of each part of the samples of a figure, N², `(PARTS,)`."""
         return self._figure(model, where, delay)[1]
 
-    def in_slip(self, model: Model) -> InSlip | None:
-        """The samples in slip; `None` of a long recording."""
+    def in_slip(self, model: Model, differences: bool = False) -> InSlip | None:
+        """The samples in slip, with the velocity of the instant at which the force acts; `None` of
+        a long recording.
+
+        `differences`: the acceleration of inertia is the difference of neighbouring velocities, and
+        not the smoothed one of `predict`.
+        """
         if self._recordings["here"].num_samples > MOST:
             return None
-        moving, _ = self._samples("here", delay_of(model))
-        left, prepared = self._left(model, "here"), self._motion("here")
-        inertia, motion, count = self.own(model).only(_of_inertia), prepared.recording, len(left)
-        with jax.enable_x64(self.x64):
-            rest, momentum, smooth = (
-                np.asarray(each, float)[:count]
-                for each in (
-                    inertia.force(motion), inertia.momentum(motion), force_along(inertia, prepared)
+        delay = delay_of(model)
+        moving, _ = self._samples("here", delay)
+        left, motion = self._left(model, "here"), self._motion("here")
+        time, velocity, segment = (
+            np.asarray(values)[: len(left)]
+            for values in (
+                motion.recording.time,
+                motion.recording.velocity,
+                motion.recording.segment,
+            )
+        )
+
+        def acting(signal: np.ndarray) -> np.ndarray:
+            return shifted(time, signal.astype(float), segment, delay)
+
+        velocity = acting(velocity)
+        if differences:
+            with jax.enable_x64(self.x64):
+                momentum, rate = (
+                    np.asarray(values, float)[: len(left)]
+                    for values in inertial(self.own(model).only(_of_inertia), motion)
                 )
-            )  # fmt: skip
-        time, velocity = (np.asarray(x, float)[:count] for x in (motion.time, motion.velocity))
-        rough = left + smooth - rest - np.gradient(momentum, time)
-        slips = moving & np.isfinite(velocity) & np.isfinite(left) & np.isfinite(rough)
-        slips &= np.abs(velocity) > float(signals.host_scales(motion)[0].slowest)
+            left = left + acting(rate - np.gradient(momentum, time))
+        slips = moving & np.isfinite(velocity) & np.isfinite(left)
+        slips &= np.abs(velocity) > float(signals.host_scales(motion.recording)[0].slowest)
         many = int(np.count_nonzero(slips))
-        part = np.arange(many) * PARTS // max(many, 1)
-        return InSlip(velocity[slips], left[slips], rough[slips], part)
+        return InSlip(velocity[slips], left[slips], np.arange(many) * PARTS // max(many, 1))
 
     def _figure(self, model: Model, where: str, delay: float | None) -> tuple[float, np.ndarray]:
         """A figure and its parts, computed once."""

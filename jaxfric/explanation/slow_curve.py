@@ -8,7 +8,6 @@ to what is left, a function of the velocity (Kim, Kim & Ha 2004, Lemma 1).
 
 from typing import NamedTuple
 
-import jax
 import numpy as np
 
 from ..data.recording import Recording
@@ -17,8 +16,7 @@ from ..terms.base import Sum, summands
 from ..terms.sample import Scales
 from . import parameters as spelled
 from .baseline import Baseline
-from .evaluation import PAIR, evaluate
-from .evidence import Evidence
+from .evaluation import in_batches
 from .figures import PARTS, Figures, InSlip
 from .findings import Findings, Solution, alone
 from .improvement import CHANCE, Improved, force_errors
@@ -26,58 +24,48 @@ from .least_squares import solve
 from .predictions import with_predictions
 from .regression import Fit, fit
 
-# Speeds in steps of a sixth: a tenth of a bump's own width, over which it bends by half a percent.
+# Steps of a tenth of the speed, over which a bump bends by less than a thousandth of its height.
 SPEEDS = 48
+# The part of the record of each bin.
+_PARTS = np.repeat(np.arange(PARTS), 2 * SPEEDS)
 
 
 class Bins(NamedTuple):
-    """Samples of one direction and about one speed in one part of a record, as rows.
+    """Samples of one direction and about one speed in one part of a record, as rows for
+    [`fit`][jaxfric.explanation.regression.fit].
 
-    `motion`: their mean velocity, `(K,)`; `weight`: roots of their numbers; `target`: their mean
-    force times that; `part` of the record; the rest as of `Evidence`.
+    `motion`: their mean velocity, m/s, `(K,)`, part by part; `weight`: roots of their numbers;
+    `target`: their mean force, N, times that; the rest as of `Evidence`.
     """
 
     motion: Recording
     weight: np.ndarray
     target: np.ndarray
-    part: np.ndarray
     limits: Scales
     peak: float
     both_ways: bool
 
     @classmethod
-    def of(cls, velocity, force, part, limits: Scales, peak: float) -> "Bins":
-        """Of samples in slip, `(C,)` each; of all bins, so that one program serves all records."""
+    def of(cls, samples: InSlip, limits: Scales, peak: float) -> "Bins":
+        """All bins, those without samples too, so that one program serves all records."""
+        velocity, force, part = samples
         ends = np.geomspace(limits.slowest, np.max(np.abs(velocity)) * (1 + 1e-9), SPEEDS + 1)
-        number = np.clip(np.searchsorted(ends, np.abs(velocity), "right") - 1, 0, SPEEDS - 1)
-        number = (2 * number + (velocity > 0)) * PARTS + part
-        size = 2 * SPEEDS * PARTS
-        count = np.bincount(number, minlength=size)
-        many = np.maximum(count, 1)
-        means = [np.bincount(number, each, size) / many for each in (velocity, force)]
-        speed = np.where(count > 0, means[0], limits.slowest)
-        none = np.zeros(size)
-        motion = Recording(none, none, none, speed)
-        weight = np.sqrt(count)
-        both = bool(velocity.min() < 0 < velocity.max())
-        parts = np.tile(np.arange(PARTS), 2 * SPEEDS)
-        return cls(motion, weight, weight * means[1], parts, limits, peak, both)
+        speed = np.clip(np.searchsorted(ends, np.abs(velocity), "right") - 1, 0, SPEEDS - 1)
+        number = (2 * part + (velocity > 0)) * SPEEDS + speed
+        count = np.bincount(number, minlength=len(_PARTS))
+        means = [
+            np.bincount(number, values, len(_PARTS)) / np.maximum(count, 1)
+            for values in (velocity, force)
+        ]
+        none, weight = np.zeros(len(_PARTS)), np.sqrt(count)
+        motion = Recording(none, none, none, np.where(count > 0, means[0], limits.slowest))
+        both_ways = bool(velocity.min() < 0 < velocity.max())
+        return cls(motion, weight, weight * means[1], limits, peak, both_ways)
 
     def columns(self, term, betas: np.ndarray) -> np.ndarray:
         """Rows of a term's columns at many β, `(G, d)` to `(G, K, p)`."""
-        found = []
-        for start in range(0, len(betas), PAIR):
-            some = betas[start : start + PAIR]
-            full = np.concatenate([some, np.repeat(some[-1:], PAIR - len(some), axis=0)])
-            found.append(np.asarray(evaluate(term, full, self.motion)[0])[: len(some)])
-        return np.concatenate(found).transpose(0, 2, 1) * self.weight[:, None]
-
-    def sorted_by_part(self) -> "Bins":
-        """With the bins of each part together."""
-        order = np.argsort(self.part, kind="stable")
-        motion = jax.tree.map(lambda values: values[order], self.motion)
-        weight, target, part = (x[order] for x in (self.weight, self.target, self.part))
-        return self._replace(motion=motion, weight=weight, target=target, part=part)
+        plain = [columns for columns, _ in in_batches(term, betas, self.motion)]
+        return np.concatenate(plain).transpose(0, 2, 1) * self.weight[:, None]
 
 
 def at_slow_speeds(known: Baseline, better: Improved, figures: Figures) -> Improved:
@@ -88,35 +76,21 @@ def at_slow_speeds(known: Baseline, better: Improved, figures: Figures) -> Impro
     """
     findings, selection = better.findings, better.findings.selection
     effects = [each.effect for each in selection.selected]
-    if known.model is not None or known.fit is not None or better.refitted:
-        return better
-    if selection.given is not None:
-        return better
-    if findings.problem.reversals or any(e.at_reversals or e.late for e in effects):
+    given = known.model is not None or known.fit is not None or selection.given is not None
+    if given or better.refitted or findings.problem.reversals:
         return better
     places = _friction(selection.last)
-    samples = figures.in_slip(findings.model(selection.last))
-    if places is None or samples is None:
+    if places is None or any(effect.at_reversals or effect.late for effect in effects):
         return better
-    evidence = findings.problem.evidence
-    found, rough = _identified(selection.last, places, samples, evidence)
+    found = _identified(findings, places, figures)
     if found is None:
         return better
-    last = _with_friction(selection.last, places, found, findings)
-    values, others = (
-        spelled.estimates(each, _EVERY, evidence.motion.unit_names)[0] for each in (found, rough)
-    )
-    values = {name: _as_known(own, others[name]) for name, own in values.items()}
-    less = _instead(better, last, values)
+    curve, values = found
+    less = _instead(better, _with_friction(selection.last, places, curve, findings), values)
     after = force_errors(less.findings, figures)
     if after.here >= better.after.here:
         return better
-    before = better.before if effects else after
-    return less._replace(before=before, after=after)
-
-
-# The part of each bin once they are sorted by parts.
-_EVERY = np.repeat(np.arange(PARTS), 2 * SPEEDS)
+    return less._replace(before=better.before if effects else after, after=after)
 
 
 class _Places(NamedTuple):
@@ -151,30 +125,44 @@ def _as_known(own: Estimate, rough: Estimate) -> Estimate:
 
 
 def _identified(
-    last: Fit, places: _Places, samples: InSlip, evidence: Evidence
-) -> tuple[Fit, Fit] | tuple[None, None]:
-    """Friction fitted to the samples without what all else makes, and the same by the other
-    acceleration; `None` where that is no better.
+    findings: Findings, places: _Places, figures: Figures
+) -> tuple[Fit, dict[str, Estimate]] | None:
+    """Friction fitted to the samples without what all else makes, and its parameters; `None` where
+    that is no better than the friction that there is.
     """
-    velocity, left, rough, part = samples
-    beta, alpha = last.betas[0][places.nonlinear], last.alphas[0][places.affine]
-    bins, other = (
-        Bins.of(velocity, each, part, evidence.limits, evidence.peak).sorted_by_part()
-        for each in (left, rough)
+    last, evidence = findings.selection.last, findings.problem.evidence
+    model = findings.model(last)
+    samples = figures.in_slip(model)
+    if samples is None:
+        return None
+    found = fitted(last, places, Bins.of(samples, evidence.limits, evidence.peak))
+    other = None if found is None else figures.in_slip(model, differences=True)
+    if found is None or other is None:
+        return None
+    bins = _with_own(last, places, Bins.of(other, evidence.limits, evidence.peak))
+    values, others = (
+        spelled.estimates(each, _PARTS, evidence.motion.unit_names)[0]
+        for each in (found, fit(found.terms, bins, found.betas))
     )
-    own = bins.columns(places.term, beta[None])[0] @ alpha
-    bins = bins._replace(target=bins.target + own)
-    fits = [fit([places.term], bins, [start]) for start in (beta, None)]
-    best = min(fits, key=lambda each: each.energy)
-    change = (bins.target - own) ** 2 - best.residual**2
-    gained = np.bincount(bins.part, change, PARTS)
+    return found, {name: _as_known(own, others[name]) for name, own in values.items()}
+
+
+def _with_own(last: Fit, places: _Places, bins: Bins) -> Bins:
+    """Bins of what a model leaves with its own friction added again."""
+    beta, alpha = last.betas[0][places.nonlinear], last.alphas[0][places.affine]
+    return bins._replace(target=bins.target + bins.columns(places.term, beta[None])[0] @ alpha)
+
+
+def fitted(last: Fit, places: _Places, left: Bins) -> Fit | None:
+    """Friction fitted to what a model leaves, for sure less than with its own; else `None`."""
+    bins, beta = _with_own(last, places, left), last.betas[0][places.nonlinear]
+    best = min((fit([places.term], bins, [b]) for b in (beta, None)), key=lambda each: each.energy)
+    gained = np.bincount(_PARTS, left.target**2 - best.residual**2, PARTS)
     sure = np.sum(gained) > CHANCE * np.sqrt(np.sum((gained - gained.mean()) ** 2))
     # More than the price of its parameters (Schwarz 1978), in the noise of a bin.
-    count, many = len(alpha) + len(beta), int(np.count_nonzero(bins.weight))
+    count, many = best.jacobian.shape[1], int(np.count_nonzero(bins.weight))
     price = count * np.log(many) * best.energy / max(many - count, 1)
-    if not sure or np.sum(gained) <= price:
-        return None, None
-    return best, fit([places.term], other._replace(target=other.target + own), best.betas)
+    return best if sure and np.sum(gained) > price else None
 
 
 def _with_friction(last: Fit, places: _Places, found: Fit, findings: Findings) -> Fit:

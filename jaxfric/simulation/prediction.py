@@ -203,6 +203,15 @@ def force_along(model: Model, motion: Prepared) -> Float[Array, " N"]:
     return at_other_times(prepared, whole, lambda part: later(prepared, part, delay))
 
 
+def inertial(model: Model, motion: Prepared) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
+    """Momentum of a model along a recording that is prepared, N·s, and its derivative, N, as
+    [`predict`][] smooths it, `(N,)` each.
+    """
+    driven = dataclasses.replace(motion.recording, velocity=motion.velocity, units=())
+    momentum = _momentum_of(model, driven)
+    return momentum, _rate(momentum, motion.recording, motion.choices[-1], motion.step)
+
+
 @programs.compiled
 def _force_of(model: Model, recording: Recording) -> Float[Array, " N"]:
     return model.force(recording)
