@@ -148,7 +148,7 @@ def test_the_search_is_repeated_without_the_laws_that_made_the_model_worse(monke
         )
 
     monkeypatch.setattr(explaining, "searched", searched)
-    monkeypatch.setattr(explaining, "_judged", judged)
+    monkeypatch.setattr(explaining, "judged", judged)
     _, better = explaining._found(None, None, None, None, 0, lambda stage: None)
     assert tried == [set(), {"stiff", "lag"}]
     assert better.findings.selection.forms == {"soft"}
@@ -645,7 +645,7 @@ def test_what_fits_less_than_what_was_dropped_is_not_named_instead(
         return types.SimpleNamespace(selection=types.SimpleNamespace(forms=frozenset(forms)))
 
     monkeypatch.setattr(explaining, "searched", found)
-    monkeypatch.setattr(explaining, "_judged", lambda *_: (None, next(rounds)))
+    monkeypatch.setattr(explaining, "judged", lambda *_: (None, next(rounds)))
     _, better = explaining._found(None, None, None, None, 0, lambda _: None)
     assert (better is first) == stands
     assert stands or better.shown is None
@@ -673,6 +673,6 @@ def test_a_law_that_is_looked_for_in_another_way_is_not_told_as_beside_the_rows(
     """A late force is dropped, and no form of a law with it."""
     found = types.SimpleNamespace(selection=types.SimpleNamespace(forms=frozenset()))
     monkeypatch.setattr(explaining, "searched", lambda *_: found)
-    monkeypatch.setattr(explaining, "_judged", lambda *_: (None, GAP))
+    monkeypatch.setattr(explaining, "judged", lambda *_: (None, GAP))
     _, better = explaining._found(None, None, None, None, 0, lambda _: None)
     assert better.dropped == GAP.dropped and better.shown is None

@@ -7,7 +7,6 @@ import jax
 import numpy as np
 
 from ..checks import Remark
-from ..data.excerpt import MOST
 from ..data.recording import Recording
 from ..identification.identified import Identified
 from ..models import Model, named
@@ -15,25 +14,24 @@ from ..simulators import AbstractSimulator
 from ..terms.base import AbstractTerm
 from . import beyond, parameters as spelled, sanity, threads, zero
 from .attributes import in_own_words
-from .baseline import Baseline, at_values, baseline_of
+from .baseline import Baseline, baseline_of
 from .doubts import contradicted
-from .earlier import Earlier, changed, obeyed, rephased
+from .earlier import Earlier, obeyed, rephased
 from .explained import Explanation
 from .findings import Findings
 from .forward import motion_error
-from .holdout import check_signals, confirmed, measured
+from .holdout import check_signals, confirmed
 from .idealised import idealised, with_idealised
-from .improvement import Errors, Improved, improved, without_unsure
+from .improvement import Errors, Improved
 from .inputs import Inputs, prepare
-from .mismatch import Mismatch, mismatch
+from .mismatch import Mismatch
 from .motion import Motion, motion_of
-from .parsimony import instead
+from .own_values import improved_model, judged, known_there
 from .problem import Problem, problem_of, with_holdout
 from .rivals import NO_EVIDENCE
-from .search import at_given, nothing, obeying, searched
+from .search import nothing, obeying, searched
 from .slow_curve import at_slow_speeds
 from .summary import facts, summarise, tone_left
-from .uncertainty import estimated
 
 
 def explain(
@@ -109,8 +107,7 @@ def _explain(
     problem = problem_of(motion, known.structure, start=known.start)
     seen = None if inputs.checked or inputs.free else sanity.stopped(motion, problem, held)
     if seen is not None and seen.stops:
-        for candidates in problem.candidate_sets:
-            candidates.close()
+        problem.close()
         found = _explain(inputs.without(seen.without), simulate, seed, doing)
         return sanity.with_stops(found, seen, inputs.figures)
     bound = None
@@ -119,8 +116,7 @@ def _explain(
     cut_off = None if bound is None else inputs.cut_off(bound.limit)
     reach = problem.evidence.reach
     if cut_off and sanity.by_samples(bound, inputs.figures, cut_off.figures, reach):
-        for candidates in problem.candidate_sets:
-            candidates.close()
+        problem.close()
         found = _explain(cut_off, simulate, seed, doing)
         found = sanity.with_limit(found, bound, inputs.figures)
         there = found.fit["holdout_force_error"]
@@ -139,22 +135,11 @@ def _explain(
         wrong, better = _with_tone(known, motion, problem, inputs, seed, doing)
     small = idealised(known, better, inputs.figures)
     if small is not None:
-        for candidates in problem.candidate_sets:
-            candidates.close()
+        problem.close()
         found = _explain(inputs._replace(baseline=small.baseline), simulate, seed, doing)
         return with_idealised(found, small)
-    if held is not None:
-        doing("validating on the held-out recording")
-        check_signals(better.findings.selection, recording, holdout)
-        place = zero.zero_of(better.findings, held)
-        if place:
-            held = zero.beginning_at(held, place)
-            inputs.figures.held_from(place)
-        remarks += zero.integrated(better.findings, place)
-        better = confirmed(better, held, inputs.figures)
-        wrong, better = _known_there(known, wrong, better, inputs)
-    else:
-        remarks += zero.integrated(better.findings, None)
+    wrong, better, more = _held_out(known, wrong, better, inputs, held, doing)
+    remarks += more
     better = at_slow_speeds(known, better, inputs.figures)
     doing("locating what is left")
     wrong = wrong if better.refitted else None
@@ -165,6 +150,24 @@ def _explain(
         errors = {when: motion_error(model, recording) for when, model in models.items()}
         explanation.fit["simulation_error"] = errors
     return sanity.without_visible(explanation) if seen is not None and seen.leans else explanation
+
+
+def _held_out(
+    known: Baseline, wrong: Mismatch | None, better: Improved, inputs: Inputs, held: Motion | None,
+    doing: Callable[[str], None],
+) -> tuple[Mismatch | None, Improved, list[Remark]]:  # fmt: skip
+    """What the held-out recording says of wrong values and findings, and what was said about it."""
+    if held is None or inputs.sound_holdout is None:
+        return wrong, better, zero.integrated(better.findings, None)
+    doing("validating on the held-out recording")
+    check_signals(better.findings.selection, inputs.sound, inputs.sound_holdout)
+    place = zero.zero_of(better.findings, held)
+    if place:
+        held = zero.beginning_at(held, place)
+        inputs.figures.held_from(place)
+    remarks = zero.integrated(better.findings, place)
+    better = confirmed(better, held, inputs.figures)
+    return *known_there(known, wrong, better, inputs), remarks
 
 
 def _known(baseline, seed: int) -> Baseline:
@@ -194,8 +197,7 @@ def _with_tone(
     width = None if tone is None else beyond.half_width(tone, problem.evidence)
     if width is None:
         return found
-    for candidates in problem.candidate_sets:
-        candidates.forget()
+    problem.forget()
     narrow = problem_of(motion, problem.structure, half_width=width, start=problem.start)
     again = _found(known, motion, narrow, inputs, seed, doing)
     names = set(better.findings.selection.names)
@@ -216,7 +218,7 @@ def _found(
     while True:
         doing("looking for what is missing")
         findings = searched(motion, problem, seed, refused)
-        wrong, better = _judged(known, findings, inputs, doing, seed)
+        wrong, better = judged(known, findings, inputs, doing, seed)
         rounds.append((wrong, better))
         gone = findings.selection.forms - better.findings.selection.forms
         if not better.dropped or gone <= refused:  # a late force is looked for in another way
@@ -261,97 +263,5 @@ def _unjudged(
     with its log each would only make up for that.
     """
     if inputs.attributes:
-        return None, _improved(known, none, None, inputs)
-    return _judged(known, none, inputs, doing, seed)
-
-
-def _judged(
-    known: Baseline, findings: Findings, inputs: Inputs, doing: Callable[[str], None], seed: int
-) -> tuple[Mismatch | None, Improved]:
-    """The baseline's wrong values beside the findings, and which of both make the model better."""
-    doing("testing the baseline's values")
-    wrong = _wrong(known, findings, seed)
-    searched_for = findings.selection.remaining.trials and not findings.selection.selected
-    if wrong is not None and searched_for:
-        one, rivals = instead(known.model, findings, wrong, seed)
-        wrong = wrong._replace(rivals=rivals)
-        if one is not None and _wrong(known, one, seed) is None:
-            findings, wrong = one, None
-    wrong = _sure(known, findings, wrong, inputs)
-    doing("predicting with the improved model")
-    return wrong, _improved(known, findings, wrong, inputs)
-
-
-def _sure(
-    known: Baseline, findings: Findings, wrong: Mismatch | None, inputs: Inputs
-) -> Mismatch | None:
-    """The wrong values without those whose told interval holds the value as given.
-
-    A simulator's own are told apart later, since those of one body are needed together; and what
-    has changed since an earlier recording is tested by the errors of both.
-    """
-    model = known.model
-    if model is None or known.errors is not None or inputs.attributes:
-        return wrong
-    names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
-    while wrong is not None and wrong.moved:
-        free = tuple(wrong.moved)
-        values = estimated(at_given(model, findings, free), free)[0]
-        away = {
-            i: abs(float(values[names[i]].value) - before) / float(values[names[i]].half_width())
-            for i, before in wrong.moved.items()
-        }
-        least = min(away, key=lambda i: away[i])
-        if away[least] > 1:
-            return wrong
-        moved = {i: before for i, before in wrong.moved.items() if i != least}
-        instead = {i: others for i, others in wrong.instead.items() if i != least}
-        wrong = wrong._replace(moved=moved, instead=instead)
-    return None
-
-
-def _known_there(
-    known: Baseline, wrong: Mismatch | None, better: Improved, inputs: Inputs
-) -> tuple[Mismatch | None, Improved]:
-    """The wrong values that are told apart from those given beside the held-out recording, too."""
-    less = _sure(known, better.findings, wrong, inputs) if better.refitted else wrong
-    if wrong is None or known.model is None or less == wrong:
-        return wrong, better
-    free = () if less is None else tuple(less.moved)
-    given = without_unsure(at_given(known.model, better.findings, free))
-    fewer = better._replace(findings=given, refitted=less is not None)
-    fewer = measured(fewer, inputs.figures)
-    if fewer.after.worse(fewer.before, inputs.figures.rounding):
-        return wrong, better
-    return less, fewer
-
-
-def _wrong(known: Baseline, findings: Findings, seed: int) -> Mismatch | None:
-    """Which of the baseline's own values are wrong, where it has any."""
-    if known.model is None:
-        return None
-    problem, selection = findings.undelayed
-    wrong = mismatch(known.model, selection.last, problem.evidence, problem.wide, seed)
-    if wrong is None or known.errors is None:
-        return wrong
-    units = problem.evidence.motion.unit_names
-    here = spelled.estimates(selection.last, problem.block, units)[0]
-    names = [p.name for p in (*known.structure.affine, *known.structure.nonlinear)]
-    return changed(wrong, known, selection.last, [float(here[n].standard_error) for n in names])
-
-
-def _improved(
-    known: Baseline, findings: Findings, wrong: Mismatch | None, inputs: Inputs
-) -> Improved:
-    """The findings beside the baseline's values as given or refitted, where the model is better."""
-    fixed = inputs.fixed and not findings.selection.trusted
-    if known.model is not None and (wrong is not None or fixed):
-        findings = at_given(known.model, findings, () if wrong is None else tuple(wrong.moved))
-    first = findings.selection.base
-    if wrong is not None:
-        first = at_values(known.model, findings.problem.evidence)
-    if inputs.recording.num_samples > MOST:  # whose predictions need the memory
-        for problem in (findings.problem, findings.undelayed.problem):
-            for candidates in problem.candidate_sets:
-                candidates.forget()
-    return improved(first, without_unsure(findings, bool(inputs.attributes)), inputs.figures)
+        return None, improved_model(known, none, None, inputs)
+    return judged(known, none, inputs, doing, seed)

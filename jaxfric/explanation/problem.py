@@ -75,6 +75,16 @@ class Problem(NamedTuple):
         """The candidates for these rows, with their columns."""
         return self.candidate_sets[0]
 
+    def close(self) -> None:
+        """Begin no more columns of candidates."""
+        for candidates in self.candidate_sets:
+            candidates.close()
+
+    def forget(self) -> None:
+        """Hold no columns of candidates any more."""
+        for candidates in self.candidate_sets:
+            candidates.forget()
+
     @property
     def wide_kernels(self) -> WideKernels:
         """The rows through kernels of 4/3 and of twice the width."""

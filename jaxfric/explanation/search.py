@@ -157,8 +157,7 @@ def _put_back(
 
 def nothing(problem: Problem) -> Findings:
     """No findings, and no search for any."""
-    for candidates in problem.candidate_sets:
-        candidates.close()
+    problem.close()
     remaining = Contest([], [], float(len(problem.base.residual)))
     return alone(Solution(problem, Selection(problem.base, problem.base, [], remaining)))
 
