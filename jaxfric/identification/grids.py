@@ -4,6 +4,7 @@ How many is decided on the host, from the scales of the recording, and rounded u
 so that few programs are compiled; where they lie follows from the bounds, which may be traced.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..terms.base import AbstractTerm, bounds
+from ..terms.effect import scattered
 from ..terms.sample import Parameter, Resolution, Scales
 
 # Without a resolution of its own a cost is smooth: a bump's width shows within an octave or so.
@@ -21,6 +23,9 @@ EVEN = Resolution(1, 16, None, 16)
 # Grid points times samples of one parameter, a few seconds' work. Above it the grid takes fewer
 # samples, and begins at what those can tell.
 WORK = 4e7
+# Combinations of the parameters of one law, where each is smooth. A grid of more would be coarse
+# along each parameter and take minutes: as many places spread evenly tell more.
+TOGETHER = 2**12
 # Points along one parameter; more would take minutes. Shorter periods are then not searched for.
 MOST = 2**16
 
@@ -137,9 +142,15 @@ def fractions(
     """Points of the grid over the parameters of one law and half the distance to their neighbours.
 
     Both `(G, d)`, in fractions of the range of each β^p from the lower bound on: all combinations,
-    but fewer places where what they are told apart by is wider.
+    but fewer places where what they are told apart by is wider; above [`TOGETHER`][] of them places
+    spread evenly.
     """
     names = [p.name for p in parameters]
+    smooth = all(resolution(p).over is None and not resolution(p).beside for p in parameters)
+    if smooth and math.prod(axis.points for axis in axes) > TOGETHER:
+        size = np.array([1 / (axis.points - 1) for axis in axes])
+        points = scattered(TOGETHER, len(names))
+        return points, np.broadcast_to(size, points.shape)
     free = [i for i, p in enumerate(parameters) if not resolution(p).beside]
     tied = [i for i in range(len(parameters)) if i not in free]
     lines = [_line(parameters[i], axes[i]) for i in free]
