@@ -33,6 +33,8 @@ UNKNOWN = 2.0
 LEAST = 2
 # The speed, in parts of the slowest that is told from rest, at which friction is that of rest.
 AT_REST = 1e-3
+# Speeds at which dry friction is asked for, and the part of a speed over which a slope is taken.
+SPEEDS, CLOSE = 8, 0.02
 
 
 class Stop(NamedTuple):
@@ -74,8 +76,8 @@ class _Standing(NamedTuple):
 
     `time` of the middle, s; `position`, m, and `velocity` there, m/s; `force`, N; `beyond`: the
     force beyond inertia and what does not depend on the direction, N; `slip`: the friction of the
-    slowest slip, and `holds`: the most that friction may hold, N; `rests`: whether the axis rests
-    in all of it.
+    slowest slip, or the dry one of a faster one where that is more, and `holds`: the most that
+    friction may hold, N; `rests`: whether the axis rests in all of it.
     """
 
     time: np.ndarray
@@ -142,10 +144,19 @@ def _standing(rows: Evidence, base: Fit) -> _Standing:
         steady = dataclasses.replace(rows.motion, velocity=jnp.full_like(speed, velocity))
         return every.project(_force(base, steady)[0])
 
-    forward, back, first, last = map(
-        at_speed, (slowest, -slowest, AT_REST * slowest, -AT_REST * slowest)
-    )
-    slip = np.maximum(forward - back, 0.0) / 2
+    def friction(speed: float) -> np.ndarray:
+        return (at_speed(speed) - at_speed(-speed)) / 2
+
+    def dry(speed: float) -> np.ndarray:
+        """Friction without what grows with the speed: its tangent's value at zero."""
+        here = friction(speed)
+        return here - (friction((1 + CLOSE) * speed) - here) / CLOSE
+
+    forward, back = at_speed(slowest), at_speed(-slowest)
+    # A curve that falls towards rest, as one bent to what the baseline lacks, is none of an axis:
+    # friction holds at least what it does in slip at any speed.
+    speeds = np.geomspace(slowest, max(rows.limits.fastest, 2 * slowest), SPEEDS)
+    slip = np.maximum(np.max([(forward - back) / 2, *map(dry, speeds)], axis=0), 0.0)
     momentum = _force(base, rows.motion)[1]
     force = every.project(np.asarray(rows.motion.force, float))
     beyond = force - every.project(np.zeros_like(speed), momentum) - (forward + back) / 2
@@ -156,7 +167,7 @@ def _standing(rows: Evidence, base: Fit) -> _Standing:
         force,
         beyond,
         slip,
-        np.maximum(HOLDS * slip, (first - last) / 2),
+        np.maximum(HOLDS * slip, friction(AT_REST * slowest)),
         rests,
     )
 
