@@ -43,6 +43,14 @@ def spanning(
     return parameters
 
 
+def anytime(findings: Findings, number: int) -> bool:
+    """Whether a change may have taken place at any moment of the recording: it is none, then."""
+    solution = findings.examined_in(number)
+    moment = solution.selection.selected[number].effect.moment
+    duration = solution.problem.evidence.limits.duration
+    return bool(moment) and _further(solution, number, moment) >= duration
+
+
 def _further(solution: Solution, number: int, name: str) -> float:
     """How much earlier or later, s, a time leaves no more; zero where half a kernel does."""
     evidence, furthest = solution.problem.evidence, 0.0

@@ -11,6 +11,7 @@ from ..simulation.errors import delay_of
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled, verification
 from .acceptance import HALF
+from .dates import anytime
 from .figures import Figures
 from .findings import Findings
 from .problem import LEAST_SHARE
@@ -150,8 +151,8 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
 
 
 def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
-    """Without changes at a moment whose size may as well be none once the moment is uncertain, and
-    without pushes all of which may be none.
+    """Without changes at a moment whose size may as well be none once the moment is uncertain, or
+    that may have been at any moment, and without pushes all of which may be none.
 
     What a change is told by is the value before and after: an interval that holds both says
     nothing. Pushes are told by their sizes alone. `as_told`: a change is tested by the interval
@@ -165,7 +166,11 @@ def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
         values = estimated(findings)[findings.selection.term_index(0) :]
         terms = findings.selection.last.terms[findings.selection.term_index(0) :]
         told = [as_told and bool(each.effect.moment) for each in selected]
-        unsure = [n for n in dated if spelled.may_be_none(terms[n], values[n], as_told=told[n])]
+        unsure = [
+            n
+            for n in dated
+            if spelled.may_be_none(terms[n], values[n], as_told=told[n]) or anytime(findings, n)
+        ]
         if not unsure:
             return findings
         findings = findings.without(unsure[-1])

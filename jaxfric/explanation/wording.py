@@ -107,7 +107,8 @@ def _by_sample(fit: Mapping[str, Any], verdict: str) -> str:
     noisy = floor is not None and floor**2 > 0.5 * whole**2
     if filtered > 0.5 * whole:
         return ""
-    if verdict == "consistent" and floor is not None and floor < 0.5 * whole <= 0.5 * LEFT:
+    claimed = verdict in ("consistent", "explained")
+    if claimed and floor is not None and floor < 0.5 * whole <= 0.5 * LEFT:
         return (
             " What is more than that is short, as beside reversals: "
             f"{filtered:.2%} is left through a filter."
