@@ -388,6 +388,29 @@ def test_velocity_is_the_position_s_unit_per_second(tmp_path, position, velocity
 
 
 @pytest.mark.parametrize(
+    ("named", "times"),
+    [
+        ({"reference_m": "reference"}, 1000.0),
+        ({"reference_mm": "reference"}, 1.0),
+        ({"neighbour_velocity_m_s": "neighbour_velocity"}, 1000.0),
+        ({"neighbour_velocity [mm/min]": "neighbour_velocity"}, 1 / 60),
+        ({"neighbour_velocity_rad_s": "neighbour_velocity"}, 1.0),
+        ({"neighbour_velocity [foo]": "neighbour_velocity"}, 1.0),
+    ],
+)
+def test_a_neighbour_and_a_reference_are_in_the_position_s_unit(tmp_path, named, times):
+    columns = log()
+    ((column, role),) = named.items()
+    table = {"t": columns["time"], "x [mm]": columns["position"], "f": columns["force"]}
+    recording, notes = io.read_with_notes(
+        save(tmp_path / "log.csv", table | {column: columns["position"]}), served=True
+    )
+    np.testing.assert_allclose(recording.channels[role], times * columns["position"], rtol=1e-12)
+    assert (f"× {times:g}" in notes[0]) == (times != 1)
+    assert ("[foo]" in "".join(notes[1:])) == ("foo" in column)
+
+
+@pytest.mark.parametrize(
     ("position", "velocity", "remedy"),
     [("x", "speed [rpm]", "--units position=rad.*--scale velocity=0.1047"),
      ("x [mm]", "speed [rpm]", "rpm, but the position is in mm.*--scale velocity=")],

@@ -185,6 +185,7 @@ _TAKEN = {
     "position": "they are",
     "reference": "being in the unit of the position",
     "velocity": "the unit of the position per second",
+    "neighbour_velocity": "the unit of the position per second",
     "force": "they are",
 }
 

@@ -12,7 +12,8 @@ _SECONDS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 def per_second(
     chosen: Mapping[str, str], scale: Mapping[str, float], units: Mapping[str, str], source: str
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """The factors that make time s, and velocity the position's unit per second; and the units.
+    """The factors that make time s, velocity the position's unit per second, that of a neighbour
+    too, and a reference that unit; and the units.
 
     Only names that state a unit are judged, and a role with a `scale` is the user's own word. The
     speed of a turning axis (rpm) without a position is in rad/s then.
@@ -25,9 +26,30 @@ def per_second(
     found, named = {}, dict(units)
     if (time := stated.get("time")) in _SECONDS:
         found["time"] = _SECONDS[time]
-    velocity = stated.get("velocity")
-    if velocity is None:
-        return found, named
+    if stated.get("velocity") is not None:
+        found |= _own(chosen, scale, units, stated, named, source)
+    wanted = named_units(chosen, scale, named).get("position", "m")
+    for role in ("reference", "neighbour_velocity"):
+        if (unit := stated.get(role)) is None:
+            continue
+        length, seconds = (unit, 1.0) if role == "reference" else _parts(unit)
+        # Of an axis that turns beside one that does not, the unit is the name's own.
+        times = 1.0 if wanted == length else factor(length, wanted)
+        if times is not None and times != seconds:
+            found[role] = times / seconds
+    return found, named
+
+
+def _own(
+    chosen: Mapping[str, str],
+    scale: Mapping[str, float],
+    units: Mapping[str, str],
+    stated: Mapping[str, str | None],
+    named: dict[str, str],
+    source: str,
+) -> dict[str, float]:
+    """The factor of the velocity, if it needs one; `named` gets the position's unit of a rate."""
+    velocity = str(stated["velocity"])
     length, seconds = _parts(velocity)
     wanted = units.get("position") or stated.get("position")
     if wanted is None and not velocity.endswith("rpm"):
@@ -41,9 +63,7 @@ def per_second(
     times = 1.0 if wanted == length else factor(length, wanted or "")
     if times is None:
         raise ValueError(_unrelated(chosen, velocity, wanted, source))
-    if times != seconds:
-        found["velocity"] = times / seconds
-    return found, named
+    return {} if times == seconds else {"velocity": times / seconds}
 
 
 def _parts(velocity: str) -> tuple[str, float]:

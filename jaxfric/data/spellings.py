@@ -64,12 +64,14 @@ _LENGTHS = {
     "m", "mm", "µm", "nm", "cm", "km", "in", "ft", "rad", "mrad", "µrad", "deg", "mdeg", "arcmin",
     "arcsec", "rev", "counts",
 }  # fmt: skip
+_RATES = {f"{length}/{per}" for length in _LENGTHS for per in ("s", "min")}
+_RATES |= {"km/h", "rpm", "krpm"}
 FITTING = {
     "time": {"s", "ms", "µs", "ns", "min", "h"},
     "position": _LENGTHS,
     "reference": _LENGTHS,
-    "velocity": {f"{length}/{per}" for length in _LENGTHS for per in ("s", "min")}
-    | {"km/h", "rpm", "krpm"},
+    "velocity": _RATES,
+    "neighbour_velocity": _RATES,
     "force": {f"{prefix}N" for prefix in ("", "k", "da", "c", "m", "µ", "M")}
     | {"lbf", "kgf", "A", "mA", "µA", "V", "mV", "%", "‰"}
     | TORQUES,
