@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from jaxfric import cli, explain, models, predict, simulators, terms
+from jaxfric.cli.arguments import whole
+from jaxfric.cli.joint_columns import logged
+from jaxfric.cli.robot_joints import opened
 from jaxfric.explanation.mismatch import fewest
 from jaxfric.simulators import Known, Mujoco
 from jaxfric.terms import KNOWN_FORCE, KNOWN_FRICTION
@@ -385,6 +388,29 @@ def both(model, seed, seconds=12.0):
     table[:, 1:3] = count * np.round(table[:, 1:3] / count)
     table[:, 3:] += 0.005 * table[:, 3:].std(axis=0) * draw.normal(size=(len(table), 2))
     return table
+
+
+def test_a_joint_that_stands_in_the_held_out_log_is_answered_without_it(tmp_path):
+    arm = TWO.format(damping=0.5, mass=1.2)
+    sticks = arm.replace('<joint name="elbow"', '<joint name="elbow" frictionloss="0.1"')
+    (tmp_path / "arm.xml").write_text(sticks)
+    paths = [str(tmp_path / f"log{seed}.csv") for seed in (1, 2)]
+    for number, path in enumerate(paths):
+        table = both(arm, number, seconds=4.0)
+        table[:, 2] = table[:, 2] if number == 0 else 0.3
+        header = "t,q1,q2,tau1,tau2"
+        np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
+    command = ["explain", paths[0], "--holdout", paths[1], "--mujoco", str(tmp_path / "arm.xml")]
+    arguments = whole().parse_args(command)
+    columns = logged(arguments, ["shoulder", "elbow"])
+
+    def joint(name):
+        return opened(name, {}, paths, columns, arguments, True, arguments.mujoco)
+
+    moves, stands = joint("shoulder"), joint("elbow")
+    assert len(moves.logs) == 2 and not moves.still
+    assert len(stands.logs) == 1 and stands.simulator is not None
+    assert "log2.csv: the joint elbow stands there" in stands.still[0]
 
 
 @pytest.mark.slow

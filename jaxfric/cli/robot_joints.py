@@ -61,11 +61,26 @@ def opened(
                 reference = np.asarray(wanted, float)
             logs.append(dataclasses.replace(log, channels=channels))
             notes += more
-        notes += [*simulator.standing, *map(_still, still)]
+        logs, unheard = _compared(simulator, logs)
+        stand = (*map(_still, still), *unheard)
+        notes += [*simulator.standing, *stand]
     except ValueError as error:
         return Joint(name, None, _refusal(error, paths), logs, None, notes)
-    stand = tuple(map(_still, still))
     return Joint(name, None, "", logs, simulator, notes, reference, logs[0], still=stand)
+
+
+def _compared(simulator: Mujoco, logs: list[Recording]) -> tuple[list[Recording], list[str]]:
+    """The logs without a held-out one in which the joint stands, and that it does."""
+    try:
+        for held in logs[1:]:
+            simulator.beside(held)
+    except ValueError:
+        text = (
+            f"{logs[1].source}: the joint {simulator.joint} stands there, or is at a limit of the "
+            "model, so that its answer is not tested on held-out motion."
+        )
+        return logs[:1], [text]
+    return logs, []
 
 
 def _held(places: Mapping[str, float], log: Recording) -> dict[str, np.ndarray]:

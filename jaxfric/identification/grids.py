@@ -148,9 +148,9 @@ def fractions(
     names = [p.name for p in parameters]
     smooth = all(resolution(p).over is None and not resolution(p).beside for p in parameters)
     if smooth and math.prod(axis.points for axis in axes) > TOGETHER:
-        size = np.array([1 / (axis.points - 1) for axis in axes])
-        points = scattered(TOGETHER, len(names))
-        return points, np.broadcast_to(size, points.shape)
+        places = scattered(TOGETHER, len(names))
+        sizes = np.array([1 / (axis.points - 1) for axis in axes])
+        return places, np.broadcast_to(sizes, places.shape)
     free = [i for i, p in enumerate(parameters) if not resolution(p).beside]
     tied = [i for i in range(len(parameters)) if i not in free]
     lines = [_line(parameters[i], axes[i]) for i in free]
