@@ -9,7 +9,7 @@ import pytest
 import jaxfric as jf
 from jaxfric.cli import main
 from jaxfric.data import io
-from jaxfric.identification import standings
+from jaxfric.identification import selection, standings
 
 KINDS = ("coulomb-viscous", "gaussian", "lorentzian", "exponential")
 
@@ -60,6 +60,19 @@ def test_without_slow_motion_it_is_said_that_shapes_cannot_be_told():
 
 
 @pytest.mark.slow
+def test_what_the_whole_recording_contradicts_is_not_chosen():
+    """Folds that lack a direction tell nothing; all samples tell a bump of a third of the force."""
+    names = ("gaussian", "coulomb-viscous", "lorentzian")
+    alike = [
+        selection.Candidate(name, 9 - 4 * (i == 1), np.ones(5), 0.1) for i, name in enumerate(names)
+    ]
+    tied = selection.Selection("coulomb-viscous", tuple(alike), names)
+    found = selection._not_contradicted(tied, machine("gaussian", 0))
+    assert found.name == "gaussian" and found.contradicted == ("coulomb-viscous",)
+    assert "does not contradict, as it does coulomb-viscous" in repr(found).replace("\n", " ")
+    assert selection._not_contradicted(tied, machine("coulomb-viscous", 0)) == tied
+
+
 def test_the_standings_are_those_of_identifying_each_one():
     """The quick way on shared rows gives what fitting each model to each fold gives."""
     recording = machine("gaussian", 3)

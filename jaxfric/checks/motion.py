@@ -79,7 +79,8 @@ def speed_faults(velocity: np.ndarray, valid: np.ndarray, unit: str) -> dict[str
     whole = valid[: count * SPAN].reshape(count, SPAN).all(axis=1)
     means = velocity[: count * SPAN].reshape(count, SPAN)[whole].mean(axis=1)
     moving = np.abs(means[np.abs(means) > MOVING * top])
-    low, high = np.quantile(moving, (0.1, 0.9)) if len(moving) > LONE else (0.0, 1.0)
+    # Fast moves tell a slope though they are few; ramps up to the one speed hardly do.
+    low, high = np.quantile(moving, (0.1, 0.98)) if len(moving) > LONE else (0.0, 1.0)
     if high < ONE_SPEED * low:
         found["one_speed"] = high / low - 1
     slips = velocity[valid & (np.abs(velocity) > MOVING * top)]

@@ -23,6 +23,8 @@ from .uncertainty import student_quantile
 # Each fold is made of this many stretches spread over the record, so that a drift or a trajectory
 # of several parts does not put one part alone into a fold.
 STRETCHES = 4
+# The check of a fit that says so of its curve.
+CONTRADICTED = "curve_missed"
 # Fewer samples hold no five folds of a model of three parameters a direction.
 FEWEST = 16
 
@@ -42,19 +44,21 @@ class Candidate(NamedTuple):
 
 class Selection(NamedTuple):
     """The chosen model's name, all candidates by rising held-out error, the names of those that
-    cannot be told from the best, and why not.
+    cannot be told from the best, and why not; `contradicted`: simpler ones of these that the whole
+    recording contradicts.
     """
 
     name: str
     candidates: tuple[Candidate, ...]
     tied: tuple[str, ...] = ()
     reason: str = ""
+    contradicted: tuple[str, ...] = ()
 
     def to_dict(self) -> dict:
         """The standings as plain data."""
         rows = [c._asdict() | {"held_out": c.held_out.tolist()} for c in self.candidates]
         return {"model": self.name, "candidates": rows, "tied": list(self.tied),
-                "reason": self.reason}  # fmt: skip
+                "reason": self.reason, "contradicted": list(self.contradicted)}  # fmt: skip
 
     def __repr__(self) -> str:
         return text.text(tabulate.standings(self.to_dict()))
@@ -73,7 +77,8 @@ def select(
 
     Every candidate is fitted to the rows of the weak form without those of one fold, and validated
     on these. Among the candidates whose mean error does not exceed the least one significantly
-    (5 %, one-sided t test of the folds' ratios), the one with the fewest parameters is chosen. One
+    (5 %, one-sided t test of the folds' ratios), the one with the fewest parameters is chosen, of
+    named models the first whose curve the whole recording does not contradict (`curve_missed`). One
     standard error (Breiman et al. 1984) would prefer a needless parameter in 19 % of ties, as five
     folds have four degrees of freedom; and by differences the fold with the largest force decides.
 
@@ -105,7 +110,7 @@ def select(
         found.append(
             Candidate(name, one.parameters, one.held_out, error, _half(one.held_out, error))
         )
-    chosen = _chosen(found)
+    chosen = _not_contradicted(_chosen(found), recording)
     speed = spell(VELOCITY, recording.unit_names)
     if len(chosen.tied) < 2:
         return chosen._replace(reason=_unseen(chosen.name, log, speed))
@@ -127,6 +132,26 @@ def _chosen(standings: Sequence[Candidate]) -> Selection:
     near = [c for c in able if _excess(c, able[0]) <= level]
     simplest = min(near, key=lambda c: c.parameters)
     return Selection(simplest.name, tuple(able), tuple(c.name for c in near))
+
+
+def _not_contradicted(chosen: Selection, recording: Recording) -> Selection:
+    """Another choice of those that are alike where the recording contradicts the simplest one's
+    curve: five folds tell less than all samples do.
+    """
+    if len(chosen.tied) < 2:
+        return chosen
+    alike = [one for one in chosen.candidates if one.name in chosen.tied]
+    gone: tuple[str, ...] = ()
+    for one in sorted(alike, key=lambda c: (c.parameters, c.filtered_force_error)):
+        if not _contradicted(one.name, recording):
+            return chosen._replace(name=one.name, contradicted=gone)
+        gone = (*gone, one.name)
+    return chosen
+
+
+def _contradicted(name: str, recording: Recording) -> bool:
+    found = identify(name, recording)
+    return any(remark.name == CONTRADICTED for remark in found.remarks)
 
 
 def _half(held_out: np.ndarray, error: float) -> float:

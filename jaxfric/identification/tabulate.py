@@ -93,6 +93,9 @@ def standings(document: Mapping[str, Any]) -> list[Block]:
     said = f"* chosen: {document['model']}"
     if len(document["tied"]) > 1:
         said += ", the simplest of those that the best does not beat significantly (=; 5 %)"
+    if contradicted := document.get("contradicted"):
+        names = ", ".join(contradicted)
+        said += f" and whose curve the whole recording does not contradict, as it does {names}"
     return [Table(table, (2, 3, 4)), [said, *([document["reason"]] if document["reason"] else [])]]
 
 
