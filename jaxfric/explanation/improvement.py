@@ -165,7 +165,7 @@ def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
             return findings
         values = estimated(findings)[findings.selection.term_index(0) :]
         terms = findings.selection.last.terms[findings.selection.term_index(0) :]
-        told = [as_told and bool(each.effect.moment) for each in selected]
+        told = [each.effect.isolated or as_told and bool(each.effect.moment) for each in selected]
         unsure = [
             n
             for n in dated
