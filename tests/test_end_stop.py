@@ -41,6 +41,27 @@ def test_a_hard_stop_is_named_with_its_place_and_nothing_else():
     assert healthy.stops == [] and not healthy.leans
 
 
+def test_the_ends_of_a_sweep_on_bristles_are_no_stops():
+    """The baseline has no bristles, and bends its friction to none at rest to make up for them."""
+    rate, low, high = 2000, 1.5, 6.0
+    t = np.arange(16000) / rate
+    span = t[-1] / np.log(high / low)
+    x = 180e-6 * np.sin(2 * np.pi * low * span * ((high / low) ** (t / t[-1]) - 1))
+    # It rests at either end once.
+    upper = int(np.argmax(x[:4000]))
+    lower = upper + int(np.argmin(x[upper : upper + 4000]))
+    rests = np.full(60, x[upper]), np.full(60, x[lower])
+    parts = x[:upper], rests[0], x[upper:lower], rests[1], x[lower:]
+    x = np.concatenate(parts)[: len(t)]
+    v, bristle = np.gradient(x, t), np.zeros_like(x)
+    for n, way in enumerate(np.diff(x), 1):  # Dahl's, exactly along each step
+        fade = np.exp(-abs(way) / 8e-6)
+        bristle[n] = np.sign(way) * (1 - fade) + bristle[n - 1] * fade
+    noise = 0.02 * np.random.default_rng(0).normal(size=len(t))
+    force = 2.0 * np.gradient(v, t) + 10.0 * bristle + 120.0 * v + noise
+    assert seen(jf.Recording(t, force, position=5e-9 * np.round(x / 5e-9))).stops == []
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.25, 0.5])

@@ -1928,8 +1928,9 @@ def test_of_a_held_out_recording_it_is_said_what_is_more_than_its_noise(held, th
 def test_more_than_noise_is_not_left_without_a_word_where_nothing_is_missing(error, said):
     fit = {"force_error": {"before": error, "after": error}, "noise_floor": 0.005}
     fit |= {"filtered_force_error": {"before": 0.001, "after": 0.001}}
-    text = wording._by_sample(fit, "consistent")
-    assert ("more than that is short" in text) == said
+    for claim in ("consistent", "explained"):
+        assert ("more than that is short" in wording._by_sample(fit, claim)) == said
+    assert "more than that is short" not in wording._by_sample(fit, "partly_explained")
 
 
 @pytest.mark.parametrize(

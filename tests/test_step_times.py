@@ -1,11 +1,14 @@
 """The time of a step in friction, a parameter or the load, with its interval."""
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxfric as jf
 from jaxfric import terms as T
+from jaxfric.explanation import dates
 
 RATE = 500.0
 
@@ -106,3 +109,20 @@ def test_coverage_of_the_time_of_a_step():
     found = jf.identify(BASE + T.FrictionStep(), jf.stack(runs))
     low, high = found.parameters["step_time"].interval()
     assert np.mean((jnp.asarray(low) <= moments) & (moments <= jnp.asarray(high))) >= 0.9
+
+
+@pytest.mark.parametrize(("further", "none"), [(19.9, False), (20.0, True)])
+def test_a_change_that_may_be_anywhere_in_the_recording_is_none(monkeypatch, further, none):
+    """Of a healthy robot's joint a burst at rest was a payload at 19 s ± 20 s."""
+    evidence = SimpleNamespace(limits=SimpleNamespace(duration=20.0))
+    problem = SimpleNamespace(evidence=evidence)
+
+    def found(moment):
+        effect = SimpleNamespace(moment=moment)
+        selection = SimpleNamespace(selected=[SimpleNamespace(effect=effect)])
+        solution = SimpleNamespace(problem=problem, selection=selection)
+        return SimpleNamespace(examined_in=lambda number: solution)
+
+    monkeypatch.setattr(dates, "_further", lambda solution, number, name: further)
+    assert dates.anytime(found("step_time"), 0) == none
+    assert not dates.anytime(found(""), 0)  # an effect that has no date
