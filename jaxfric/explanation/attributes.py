@@ -178,7 +178,7 @@ def _gear(own: Mapping[str, Attribute]) -> str:
 # Without a command in the log, what else a constant force may be.
 MAY_BE = (
     "the actuator's bias, which a log of its command would show, the zero of the force's sensor, "
-    "or a weight or a tilt that the model lacks"
+    "a weight or a tilt that the model lacks, or friction that differs with the direction"
 )
 # A filter that the model's actuator lacks, in MuJoCo's own words.
 FILTER = "filterexact"
