@@ -9,6 +9,7 @@ import pytest
 import jaxfric as jf
 from jaxfric import cli
 from jaxfric.explanation import agreement, fewest_numbers
+from jaxfric.explanation.acceptance import LINEARITY
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
 from jaxfric.explanation.finding import Moved
@@ -60,14 +61,23 @@ def motion(count=1500, seconds=12.0):
     return inverse.Motion(*(part.sum(axis=1).T for part in parts)), time
 
 
-def rows(nominal, plant, noise=0.005, seed=0):
-    """The rows of both joints, the force that of the plant by MuJoCo, and what the bodies weigh."""
+def rows(
+    nominal, plant, noise=0.005, seed=0, names=("shoulder", "elbow"), correlated=1, error=None
+):
+    """The rows of both joints, the force that of the plant by MuJoCo, and what the bodies weigh.
+
+    **Arguments:** `noise` of each joint, N·m; `correlated`: samples over which it is a mean;
+    `error` of the second joint's sensor, relative, where a sensor is known to a thousandth or two.
+    """
     model, true = (mujoco.MjModel.from_xml_string(text) for text in (nominal, plant))
     along, time = motion()
     seen = inverse.along(mujoco, model, along)
-    forces = inverse.forces(mujoco, true, along) - inverse.forces(mujoco, model, along)
+    whole = inverse.forces(mujoco, true, along) * (1 + np.array([0.0, error or 0.0]))
+    forces = whole - inverse.forces(mujoco, model, along)
+    power = np.sum(whole**2, axis=0)
+    mean = np.ones(correlated) / np.sqrt(correlated)
     draw, found = np.random.default_rng(seed), []
-    for joint, name in enumerate(("shoulder", "elbow")):
+    for joint, (name, size) in enumerate(zip(names, np.broadcast_to(noise, 2), strict=True)):
         turned, products = (
             [(rest, 0 * rest) for rest in each(mujoco, model, joint, seen)]
             for each in (by_gravity, pulled)
@@ -76,11 +86,13 @@ def rows(nominal, plant, noise=0.005, seed=0):
         columns = np.array([rest + np.gradient(moving, time) for rest, moving in parts]).T
         own = np.array([along.velocity[:, joint], along.acceleration[:, joint]]).T
         inner = slice(2, -2)  # the ends have one-sided differences
-        target = forces[:, joint] + noise * draw.normal(size=len(time))
-        names = (f"joint/{name}/damping", f"joint/{name}/armature")
-        whole = np.concatenate([own, columns], axis=1)[inner] / noise
+        drawn = np.convolve(draw.normal(size=len(time)), mean, "same")
+        target = (forces[:, joint] + size * drawn)[inner] / size
+        values = (f"joint/{name}/damping", f"joint/{name}/armature")
+        every = np.concatenate([own, columns], axis=1)[inner] / size
         block = np.arange(len(time) - 4) * 24 // (len(time) - 4)
-        found.append(JointRows(name, names, whole, target[inner] / noise, block, 1.0))
+        enough = 1.0 if error is None else (LINEARITY / size) ** 2 * power[joint]
+        found.append(JointRows(name, values, every, target, block, enough))
     return Bodies(found, weights(mujoco, model), model.opt.gravity)
 
 
@@ -100,6 +112,47 @@ def test_the_fewest_numbers_are_those_that_differ(other, values):
         estimate = found.estimates[FORE + name]
         assert abs(found.values[FORE + name] - value) < max(3 * estimate.standard_error, 1e-4)
         assert estimate.standard_error < 0.01 * value
+
+
+COLUMN = """<mujoco>
+  <worldbody>
+    <body name="column">
+      <joint name="lift" type="slide" axis="0 0 1" damping="180" armature="25"/>
+      <inertial pos="0.1 0 0.3" mass="38" diaginertia="2 2 1"/>
+      <body name="turn" pos="0.2 0 0.2">
+        <joint name="rot" axis="0 0 1" damping="0.9" armature="0.1"/>
+        <inertial pos="0.15 0 0" mass="{mass}" diaginertia="0.08 0.2 0.2"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_one_mass_that_does_as_well_as_two_numbers_is_the_answer(seed):
+    """The column's mass and an armature leave a little less of the noise; so do mass and centre."""
+    noise, names = (2.0, 0.07), ("lift", "rot")
+    plants = (COLUMN.format(mass=mass) for mass in (9, 13.5))
+    robot = rows(*plants, noise, seed, names, correlated=6)
+    found = answer(robot, {"column", "turn"})
+    assert list(found.values) == ["body/turn/mass_alone"]
+    known = found.estimates["body/turn/mass_alone"]
+    assert abs(known.value - 13.5) < 3 * known.standard_error < 0.1
+    two = robot.fitted(["body/column/mass_alone", "rot:joint/rot/armature"], {})[1]
+    assert robot.energies(two).sum() < robot.energies(found.values).sum()
+    assert not fewest_numbers._less(robot, two, found.values)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_what_no_sensor_resolves_is_no_number_beside_a_noisy_joint(seed):
+    """The shoulder's noise is more than all numbers take; the elbow's sensor is 0.18 % wrong."""
+    noise = 0.1, 0.002
+    robot = rows(arm(), arm(mass="1.7"), noise, seed, correlated=6, error=0.9 * LINEARITY)
+    found = answer(robot, {"upper", "fore"})
+    assert not fewest_numbers.sufficient(robot, found.values)
+    assert list(found.values) == [FORE + "mass_alone"]
+    assert found.values[FORE + "mass_alone"] == pytest.approx(1.7, rel=3 * LINEARITY)
 
 
 def test_a_load_is_one_body_of_one_mass_and_centre():
@@ -275,14 +328,14 @@ def test_a_mass_alone_is_one_number_of_the_file():
     assert len(changed) == 1 and 'mass="1.7" diaginertia="0.002 0.009 0.009"' in changed.pop()
 
 
-def log(path, plant, seed):
+def log(path, plant, seed, names=("shoulder", "elbow"), gains=(900.0, 300.0)):
     """A log of both joints under a controller, with noise."""
     model = mujoco.MjModel.from_xml_string(plant)
     data, draw = mujoco.MjData(model), np.random.default_rng(seed)
     along, time = motion(12000)
     turn = draw.uniform(0.8, 1.0)
     data.qpos[:], data.qvel[:] = turn * along.position[0], turn * along.velocity[0]
-    table, gains = [], np.array([900.0, 300.0])
+    table, gains = [], np.array(gains)
     for i in range(len(time)):
         away = turn * along.position[i] - data.qpos
         force = gains * away + 0.06 * gains * (turn * along.velocity[i] - data.qvel)
@@ -293,7 +346,8 @@ def log(path, plant, seed):
     table = np.array(table)
     table[:, 1:3] += 1e-5 * draw.normal(size=(len(table), 2))
     table[:, 3:] += 0.003 * table[:, 3:].std(axis=0) * draw.normal(size=(len(table), 2))
-    header = "time,shoulder_position,elbow_position,shoulder_torque,elbow_torque"
+    columns = [f"{name}_{what}" for what in ("position", "force") for name in names]
+    header = ",".join(["time", *columns])
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9g")
 
 
@@ -341,7 +395,7 @@ def test_a_value_that_makes_a_joint_worse_is_not_written(tmp_path):
     path, file = tmp_path / "log.csv", tmp_path / "arm.xml"
     file.write_text(arm())
     log(path, arm(mass="1.7"), 1)
-    columns = {"position": "elbow_position", "force": "elbow_torque"}
+    columns = {"position": "elbow_position", "force": "elbow_force"}
     units = {"force": "N·m", "position": "rad"}
     others = {"shoulder": "shoulder_position"}
     recording = jf.read(str(path), columns=columns | others, units=units)
@@ -372,3 +426,43 @@ def test_values_of_several_bodies_raise_a_doubt_about_the_geometry():
     assert said(FORE + "mass", FORE + "centre_x", "option/gravity/x") == []
     (doubt,) = said(FORE + "mass", "body/upper/mass")
     assert "2 bodies" in doubt and "geometry" in doubt
+
+
+GANTRY = """<mujoco>
+  <option timestep="0.001" integrator="implicitfast"/>
+  <worldbody>
+    <body name="bridge">
+      <joint name="x" type="slide" axis="1 0 0" damping="60" armature="9"/>
+      <inertial pos="0 0 0" mass="25" diaginertia="2 1 2"/>
+      <body name="carriage">
+        <joint name="y" type="slide" axis="0 1 0" damping="35" armature="5"/>
+        <inertial pos="0 0 0" mass="{mass}" diaginertia="0.1 0.1 0.1"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("plant", "values"),
+    [
+        (GANTRY.format(mass=15.4), {"body/carriage/mass"}),
+        (GANTRY.format(mass=12).replace('"9"', '"11"').replace('"5"', '"8"'),
+         {"joint/x/armature", "joint/y/armature"}),
+    ],
+)  # fmt: skip
+def test_one_mass_is_written_where_it_stands_for_two_armatures(tmp_path, plant, values):
+    """By itself each joint of a gantry tells of its armature; other changes are two numbers."""
+    (tmp_path / "gantry.xml").write_text(GANTRY.format(mass=12))
+    log(tmp_path / "log.csv", plant, 1, ("x", "y"), (40000.0, 20000.0))
+    command = ["explain", str(tmp_path / "log.csv"), "--mujoco", str(tmp_path / "gantry.xml")]
+    new, out = str(tmp_path / "new.xml"), str(tmp_path / "out.json")
+    assert cli.main([*command, "--save", new, "--json", out]) == 0
+    document = json.loads((tmp_path / "out.json").read_text())
+    assert {line.partition(":")[0] for line in document["patch"]["written"]} == values
+    assert [row["verdict"] for row in document["joints"]] == ["explained"] * 2
+    made, true = mujoco.MjModel.from_xml_path(new), mujoco.MjModel.from_xml_string(plant)
+    assert made.body_mass[1:] == pytest.approx(true.body_mass[1:], rel=0.01)
+    assert made.dof_armature == pytest.approx(true.dof_armature, rel=0.02)

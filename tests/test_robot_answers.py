@@ -5,7 +5,7 @@ import types
 import numpy as np
 import pytest
 
-from jaxfric.cli import robot, robot_text
+from jaxfric.cli import robot, robot_text, together
 from jaxfric.explanation import Explanation, attributes, contradictions
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import percent
@@ -166,3 +166,32 @@ def test_joints_that_agree_on_a_body_or_tell_of_two_moments_do_not_contradict():
     assert contradictions.with_contradictions(alike) == alike
     apart = {"waist": told_by(2.655, 0.025), "elbow": told_by(1.6, 0.014, at=5.0)}
     assert contradictions.with_contradictions(apart) == apart
+
+
+def armed(name, alike, instead=()):
+    """A joint that by itself finds its armature wrong, and what would do as well."""
+    key = f"joint/{name}/armature"
+    own = {key: Attribute(f"joint {name}", "armature", 5.0, "kg", alike)}
+    own |= {f"body/{body}/mass": Attribute(f"body {body}", "mass", 1.0, "kg") for body in instead}
+    value = Moved(5.0, Estimate(np.float64(8.0), np.float64(0.01), "kg", 20.0))
+    others = {key: tuple(f"body/{body}/mass" for body in instead)}
+    finding = Finding("parameter_mismatch", "", "", (), "", {key: value}, 0.9, None, 0.0)
+    told = types.SimpleNamespace(findings=[finding._replace(instead=others)])
+    return robot.Joint(name, told, "", [], types.SimpleNamespace(attributes=lambda: own), [])
+
+
+def test_all_joints_are_asked_where_one_body_may_stand_for_values_of_two():
+    x = armed("x", ("mass of body bridge", "mass of body carriage"))
+    y = armed("y", ("damping of joint y",), ("carriage",))
+    assert together._by_one_body([x, y]) == {"body carriage"}
+    assert not together._by_one_body([x])
+    assert not together._by_one_body([x, armed("y", ("mass of body ram",))])
+
+
+def test_a_body_s_value_counts_once_of_all_joints():
+    x, y = armed("x", ()), armed("y", ())
+    assert together._count([x, y]) == 2
+    (finding,) = x.told.findings
+    mass = {"body/carriage/mass": finding.parameters["joint/x/armature"]}
+    told = types.SimpleNamespace(findings=[finding._replace(parameters=mass)])
+    assert together._count([x._replace(told=told), y._replace(told=told)]) == 1

@@ -1,6 +1,7 @@
 """A robot's bodies, and gravity, by all of its joints: one value of each, and the joints again."""
 
 from argparse import Namespace
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from ..explanation.acceptance import LINEARITY
@@ -24,12 +25,14 @@ def together(
 
     Where a joint by itself finds what a weight can do, all joints are asked for the fewest values
     of bodies and of gravity that explain them all; with these the joints are explained again, each
-    by what is its own. Where the file does not take the values, or a joint is left with clearly
-    more than by its own answer, the joints' own answers stand: what they contradict each other in
-    is not written. `source`: the model's file, or its text.
+    by what is its own. They are asked as well where a value of one body may stand for values of two
+    joints, and believed then if they need fewer. Where the file does not take the values, or a
+    joint is left with clearly more than by its own answer, the joints' own answers stand: what they
+    contradict each other in is not written. `source`: the model's file, or its text.
     """
     able = [joint for joint in found if joint.told is not None and joint.simulator is not None]
-    if not any(_of_bodies(joint) or _as_a_weight(joint) for joint in able):
+    needed = any(_of_bodies(joint) or _as_a_weight(joint) for joint in able)
+    if not needed and not _by_one_body(able):
         return list(found)
     mujoco, folder = library(), folder_of(arguments.mujoco)
     told = [Told(j.simulator, j.logs, j.told) for j in able if j.simulator and j.told]
@@ -47,7 +50,7 @@ def together(
                 return list(found)
             joint = _joined(joint, new, agreement, names)
         again.append(joint)
-    return again
+    return again if needed or _count(again) < _count(found) else list(found)
 
 
 def loaded(found: Sequence[Joint]) -> list[Joint]:
@@ -93,6 +96,32 @@ def _as_a_weight(joint: Joint) -> bool:
     names = {key.split("/")[-1] for key in wrong(joint)}
     places = {EFFECTS[f.effect].family for f in findings if f.effect in EFFECTS}
     return bool(names & {CONSTANT, "stiffness", "springref"}) or "position" in places
+
+
+def _by_one_body(joints: Sequence[Joint]) -> set[str]:
+    """The bodies of which a value would do as well as wrong values of two joints or more."""
+    each = Counter(body for joint in joints for body in _could_be_of(joint))
+    return {body for body, count in each.items() if count > 1}
+
+
+def _could_be_of(joint: Joint) -> set[str]:
+    """The bodies of which a value would do as well as one that a joint by itself finds wrong: in
+    this motion, or in any.
+    """
+    findings = [f for f in joint.told.findings if f.effect == MISMATCH] if joint.told else []
+    own = joint.simulator.attributes() if joint.simulator else {}
+    keys = [key for f in findings for others in f.instead.values() for key in others]
+    owners = {own[key].owner for key in keys if key in own}
+    alike = [words for f in findings for key in f.parameters if key in own
+             for words in own[key].alike]  # fmt: skip
+    owners |= {words.rpartition(" of ")[2] for words in alike}
+    return {owner for owner in owners if owner.startswith("body ")}
+
+
+def _count(joints: Sequence[Joint]) -> int:
+    """How many values are wrong by all joints; those of bodies and of gravity are one each."""
+    of_all = set[str]().union(*map(shared, joints))
+    return len(of_all) + sum(len(wrong(joint) - of_all) for joint in joints)
 
 
 def _moves(joint: Joint, agreement: Agreement) -> bool:

@@ -86,25 +86,44 @@ def _fewest(
 ) -> State:
     """The fewest numbers of joints and those bodies that leave no more than all do, `most` at most.
 
-    Each of them beyond its noise; among sets that do as well, the one that changes least.
+    Each of them beyond its noise, and more of them only where they leave less; among sets that do
+    as well, the one that changes least.
     """
     found, beam = State(), [State()]
-    while len(found) < most and not sufficient(robot, found):
+    while len(beam[0]) < most and not sufficient(robot, found):
         tried: dict[frozenset[str], tuple[float, State]] = {}
         for state in beam:
             for name in _promising(robot, state, bodies):
                 names = frozenset({*state, name})
                 if names not in tried:
                     tried[names] = robot.fitted([*state, name], state)
-        best = sorted(tried.values(), key=lambda each: each[0])[:BEAM]
-        beam = [state for energy, state in best if np.isfinite(energy)]
+        kept = sorted(tried.values(), key=lambda each: each[0])[:BEAM]
+        beam = [state for energy, state in kept if np.isfinite(energy)]
         sure = [state for state in beam if _sure(robot, state)]
         if not sure:
             break
         alike = robot.energies(sure[0]) + robot.enough
-        sure = [state for state in sure if np.all(robot.energies(state) <= alike)]
-        found = min(sure, key=lambda state: _changed(robot, state, apart))
+        good = [state for state in sure if np.all(robot.energies(state) <= alike)]
+        best = [state for state in good if _less(robot, state, found)]
+        if best:
+            found = min(best, key=lambda state: _changed(robot, state, apart))
+        elif any(sufficient(robot, state) for state in sure):
+            break
     return found
+
+
+def _less(robot: Bodies, state: State, fewer: State) -> bool:
+    """Whether a state leaves less than one of fewer numbers: for each number more, more than noise
+    takes, and of one joint at least more than a sensor of force resolves.
+
+    Where a force has more noise than its sensor has errors, all numbers together always leave less.
+    """
+    gains = robot.energies(fewer) - robot.energies(state)
+    noise = max(
+        _noise(robot, name, {n: v for n, v in state.items() if n != name}, state) for name in state
+    )
+    enough = SURE**2 * (len(state) - len(fewer)) * noise
+    return bool(np.any(gains > robot.enough) and gains.sum() > enough)
 
 
 def _promising(robot: Bodies, state: State, bodies: frozenset[str]) -> list[str]:
