@@ -40,6 +40,8 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
+    sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
+    words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
     # Names may be a simulator's, of any characters.
     return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
 

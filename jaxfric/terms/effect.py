@@ -229,10 +229,11 @@ class Effect:
 
     How it is told:
 
-    - `sentence`: with parameters in braces; `variant`: another sentence where the name promises
-      more than the values hold. `sizes`: parameters of which only the most is known where other
-      terms could stand in for all of it. `moment`: the parameter that dates it; `lasting`: that by
-      which it is over again. `dates`: times, s, that a term holds as given numbers, by name.
+    - `sentence`: with parameters in braces, `{name:size}` without a sign; `variant`: another
+      sentence where the name promises more than the values hold. `sizes`: parameters of which only
+      the most is known where other terms could stand in for all of it. `moment`: the parameter that
+      dates it; `lasting`: that by which it is over again. `dates`: times, s, that a term holds as
+      given numbers, by name.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.

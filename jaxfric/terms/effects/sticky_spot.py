@@ -1,5 +1,6 @@
-"""Extra friction at one place."""
+"""More or less friction at one place."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -8,9 +9,9 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect, View
+from ..effect import Effect, Extent, View
 from ..position import WITH_DIRECTION, shortest, stroke, within
-from ..sample import UNKNOWN, Parameter, Resolution, Sample
+from ..sample import UNKNOWN, Burden, Parameter, Resolution, Sample
 
 
 def _spot_bounds(scales):
@@ -27,9 +28,9 @@ _WIDTH = Resolution(0, 2, None, 12)
 
 
 class StickySpot(AbstractLaw):
-    """Extra friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
+    """More or, where A < 0, less friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
 
-    `spot_position` x₀, m; `spot_width` w, m.
+    `spot_position` x₀, m; `spot_width` w, m. Less is no more than the friction that there is.
     """
 
     spot_position: Float[Array, ""] | float = UNKNOWN
@@ -50,6 +51,9 @@ class StickySpot(AbstractLaw):
         away = f"((x - {place}) / {width})"
         return (f"{s.call('sign', 'v')} * {s.call('exp', f'-0.5 * {away} * {away}')}",)
 
+    def burden(self, beta, alpha) -> Burden | None:
+        return Burden(0.0, -float(alpha[0])) if alpha[0] < 0 else None
+
     def extent(self, values):
         at, reach = values["spot_position"], 4 * values["spot_width"]
         return {"position": (at - reach, at + reach)}
@@ -64,6 +68,15 @@ def spots(term: AbstractTerm, view: View) -> np.ndarray:
     return np.array([(at, w) for w in widths for at in np.arange(low + w / 2, high, w)])
 
 
+def _slippery(values: Mapping[str, float], extent: Extent) -> str | None:
+    if values["spot_force"] >= 0:
+        return None
+    return (
+        "Friction is lower by {spot_force:size} around {spot_position}, half-width {spot_width}: a "
+        "worn or a well-greased place"
+    )
+
+
 STICKY_SPOT = Effect(
     "sticky_spot",
     "sign(v) A exp(−(x − x₀)²/(2w²))",
@@ -74,6 +87,6 @@ STICKY_SPOT = Effect(
     needs=frozenset({"position"}),
     confusable_with=("position_dependent_friction", "disturbance_pulses"),
     separate_by="Cross the place slowly, both ways, several times.",
-    positive=True,
     grid=spots,
+    variant=_slippery,
 )
