@@ -61,3 +61,32 @@ def test_a_worn_place_is_found(inertia, friction, reach, at, width, size):
     assert float(values["spot_force"].value) == pytest.approx(size, rel=0.1)
     assert float(values["spot_position"].value) == pytest.approx(at, abs=0.2 * width)
     assert found.verdict == "explained"
+
+
+def test_a_force_at_one_place_is_told_by_where_it_pulls():
+    """Where the axis needs a force upwards, one acts downwards."""
+    up = {
+        "local_force": Estimate(np.float64(12.0), np.float64(0.2), "N"),
+        "local_force_position": Estimate(np.float64(0.5), np.float64(0.001), "m"),
+        "local_force_width": Estimate(np.float64(0.06), np.float64(0.001), "m"),
+    }
+    for value, way in ((12.0, "smaller"), (-12.0, "larger")):
+        values = up | {"local_force": up["local_force"]._replace(value=np.float64(value))}
+        text = told(EFFECTS["local_force"], values)
+        assert "a force of 12.00 N ± 0." in text and f"towards {way} positions" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("inertia", "friction", "reach", "at", "width", "size"),
+    [(40.0, 30.0, 0.8, 0.1, 0.06, 8.0), (3e-4, 0.02, 30.0, -5.0, 2.0, -0.01)],
+)
+def test_a_force_at_one_place_is_no_wave(inertia, friction, reach, at, width, size):
+    hump = terms.LocalForce(at, width)
+    runs = [axis(inertia, friction, reach, hump, (size,), seed=seed) for seed in (0, 1)]
+    found = explain(runs[0], models.gaussian(), runs[1])
+    assert [each.effect for each in found.findings] == ["local_force"]
+    values = found.findings[0].parameters
+    assert float(values["local_force"].value) == pytest.approx(size, rel=0.1)
+    assert float(values["local_force_position"].value) == pytest.approx(at, abs=0.2 * width)
+    assert found.verdict == "explained"

@@ -14,7 +14,7 @@ from ..position import WITH_DIRECTION, shortest, stroke, within
 from ..sample import UNKNOWN, Burden, Parameter, Resolution, Sample
 
 
-def _spot_bounds(scales):
+def spot_bounds(scales):
     """From two samples at the top speed to a quarter of the stroke, beyond which it is no spot."""
     return shortest(scales), 0.25 * stroke(scales)
 
@@ -24,7 +24,7 @@ def _spot_bounds(scales):
 _BY_WIDTH = Resolution(1, 1.5, None, 96, "spot_width")
 
 
-_WIDTH = Resolution(0, 2, None, 12)
+SPOT_WIDTH = Resolution(0, 2, None, 12)
 
 
 class StickySpot(AbstractLaw):
@@ -39,7 +39,7 @@ class StickySpot(AbstractLaw):
     affine: ClassVar = (Parameter("spot_force", FORCE),)
     nonlinear: ClassVar = (
         Parameter("spot_position", POSITION, within, logarithmic=False, resolution=_BY_WIDTH),
-        Parameter("spot_width", POSITION, _spot_bounds, resolution=_WIDTH),
+        Parameter("spot_width", POSITION, spot_bounds, resolution=SPOT_WIDTH),
     )
     coordinates: ClassVar = WITH_DIRECTION
 
@@ -59,13 +59,23 @@ class StickySpot(AbstractLaw):
         return {"position": (at - reach, at + reach)}
 
 
-def spots(term: AbstractTerm, view: View) -> np.ndarray:
-    """Places one width apart, for widths by factors of 1.6 from what the kernel resolves."""
+def places(view: View, apart: float, count: int) -> np.ndarray:
+    """Places so many widths apart, for some widths from what the kernel resolves, `(G, 2)`."""
     low, high = float(view.limits.low), float(view.limits.high)
     stroke = high - low
     narrowest = np.clip(0.5 * view.speed * view.reach, stroke / 100, stroke / 8)
-    widths = np.geomspace(narrowest, stroke / 4, 6)
-    return np.array([(at, w) for w in widths for at in np.arange(low + w / 2, high, w)])
+    widths = np.geomspace(narrowest, stroke / 4, count)
+    ends = [(low + 0.5 * apart * w, apart * w) for w in widths]
+    return np.array([
+        (at, w)
+        for w, (first, step) in zip(widths, ends, strict=True)
+        for at in np.arange(first, high, step)
+    ])  # fmt: skip
+
+
+def spots(term: AbstractTerm, view: View) -> np.ndarray:
+    """Places one width apart, for widths by factors of 1.6 from what the kernel resolves."""
+    return places(view, 1.0, 6)
 
 
 def _slippery(values: Mapping[str, float], extent: Extent) -> str | None:
