@@ -203,7 +203,8 @@ class Effect:
     - `sharp`: its columns hold a derivative of the acceleration: what the encoder's noise makes of
       that is the noise that the controller answered, which explains force without physics.
     - `delays`: to first order it delays the force, so that force and motion are aligned without it.
-    - `leftover`: strong effects leave something of its shape.
+    - `leftover`: strong effects leave something of its shape. `local`: at one place, so that it may
+      be nearly all that they leave there.
     - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
     - `idealised`: models idealise it; what of it makes no more of the force than noise does is told
@@ -258,6 +259,7 @@ class Effect:
     sharp: bool = False
     delays: bool = False
     leftover: bool = False
+    local: bool = False
     isolated: bool = False
     ubiquitous: bool = False
     idealised: bool = False
