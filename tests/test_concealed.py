@@ -53,7 +53,8 @@ def expected_noise(machine):
 
 # A wrong parameter and a zero belong to a model, not to a machine, a hard limit is a definition of
 # saturation, and how friction passes zero is drawn of every machine; machines whose mass or gain
-# changes while they run are not drawn yet: tests/test_moments.py plants those.
+# changes while they run are not drawn yet: tests/test_moments.py plants those, and
+# tests/test_places.py a force at one place.
 NOT_DRAWN = {
     "smooth_friction",
     "parameter_mismatch",
@@ -63,6 +64,7 @@ NOT_DRAWN = {
     "gain_step",
     "parameter_step",
     "disturbance_force",
+    "local_force",
 }
 
 

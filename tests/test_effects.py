@@ -45,6 +45,7 @@ CASES = {
     "lower_end_stop": (T.LowerEndStop(-0.02), (80.0,)),
     "position_friction": (T.PositionDependentFriction(0.05), (0.9, 1.1)),
     "sticky_spot": (T.StickySpot(0.01, 0.003), (2.0,)),
+    "local_force": (T.LocalForce(0.01, 0.003), (2.0,)),
     "position_inertia": (T.PositionDependentInertia(0.06), (0.4, 0.5)),
     "load_friction": (T.LoadDependentFriction(), (0.1,)),
     "reaction_friction": (T.ReactionFriction(), (0.1,)),
@@ -728,6 +729,7 @@ def test_the_catalogue_holds_together():
         "parameter_mismatch asymmetric_friction smooth_friction stribeck viscous_nonlinearity "
         "gravity_unbalance "
         "cogging spring hardening_spring end_stop position_dependent_friction sticky_spot "
+        "local_force "
         "position_dependent_inertia load_dependent_friction presliding frictional_lag backlash "
         "compliance force_limit position_zero transport_delay actuator_lag clock sensor_filter "
         "actuator_deadband actuator_saturation "

@@ -48,6 +48,7 @@ LAWS = {
     "lower stop": terms.LowerEndStop(-0.3),
     "friction": terms.PositionDependentFriction(0.4),
     "spot": terms.StickySpot(0.1, 0.2),
+    "local force": terms.LocalForce(0.1, 0.2),
     "varying inertia": terms.PositionDependentInertia(0.7),
     "tone": terms.PeriodicDisturbance(2.0),
     "load drift": terms.LoadDrift(start=-0.8, duration=1.5, degree=5),

@@ -68,6 +68,22 @@ def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
     assert "with a period of 0.43 m" in told
 
 
+def test_waves_that_nearly_cancel_are_told_neither_by_a_pitch_nor_by_a_bound():
+    values = {
+        "cogging_sin": estimate(180.0, 100.0, "N"),
+        "cogging_cos": estimate(-20.0, 90.0, "N"),
+        "amplitude": estimate(183.0, 100.0, "N"),
+        "pitch": estimate(0.3, 0.4, "m"),
+    }
+    told = sentence("cogging", values, 0.1, (), Extent(0.0, 0.8, 60.0))
+    assert "varies slowly along the stroke, by an amount that this recording cannot tell" in told
+    told = sentence("cogging", values, 0.1, (), Extent(0.0, 0.8, 600.0))
+    assert "by at most 3" in told and "period" not in told
+    known = values | {"pitch": estimate(0.3, 0.004, "m"), "amplitude": estimate(18.0, 1.0, "N")}
+    told = sentence("cogging", known, 0.1, (), Extent(0.0, 0.8, 60.0))
+    assert "periodic in position, period 0.3000 m ± " in told
+
+
 def test_a_magnitude_whose_interval_holds_zero_is_no_number():
     values = {"knee": estimate(5.3, 1.6, "N·m"), "saturation": estimate(6.0, 111.0, "1")}
     told = sentence("actuator_saturation", values, 0.73, ())

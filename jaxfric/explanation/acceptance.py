@@ -36,7 +36,8 @@ EASY_OF_BASE = 0.05
 REVERSAL_OF_BASE = 0.25
 # A term that removes three quarters of the residual needs none of these: the remainder of an
 # idealisation is not of one law's shape. On machines with one effect a second name took two thirds
-# at most. But pushes are no law: each has a moment and a size of its own.
+# at most. But pushes are no law: each has a moment and a size of its own. And what a stop that
+# stiffens leaves of a straight one is nearly all at its knee: a hump there is none (`local`).
 NEARLY_ALL = 0.75
 
 
@@ -97,7 +98,7 @@ def least_gain(
     if effect.momentary and any(earlier.momentary for earlier in before):
         return OF_BASE * base
     again = any(earlier.at_reversals for earlier in before)
-    most = np.inf if effect.isolated else NEARLY_ALL * remaining
+    most = np.inf if effect.isolated or effect.local else NEARLY_ALL * remaining
     if again and (effect.at_reversals or effect.isolated):
         return min(REVERSAL_OF_BASE * base, most)
     if effect.leftover:

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
-from ..terms.effect import Effect, Extent
+from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
+from ..units import FORCE
 from .quantities import UNSEEN, nil, quantity, turns
 
 NOWHERE = Extent()
@@ -36,10 +37,18 @@ def sentence(
 
 def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NOWHERE) -> str:
     """An effect with its values in words, without a full stop."""
-    values = {n: float(estimate.value) for n, estimate in parameters.items()}
+    # A period that is not known has not been seen to repeat.
+    values = {
+        n: math.inf if n in effect.periods and _unseen(estimate) else float(estimate.value)
+        for n, estimate in parameters.items()
+    }
     template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
+    if _beyond(effect, parameters, extent.force):
+        words["amplitude"] = UNSEEN
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
+    sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
+    words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
     # Names may be a simulator's, of any characters.
     return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
 
@@ -73,6 +82,22 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     if name in effect.periods:
         return quantity(estimate) + turns(estimate)
     return quantity(estimate)
+
+
+def _unseen(estimate: Estimate) -> bool:
+    """Whether a magnitude is any, for all that is known of it."""
+    return nil(estimate) or math.isinf(float(estimate.standard_error))
+
+
+def _beyond(effect: Effect, parameters: Mapping[str, Estimate], force: float) -> bool:
+    """Whether the most that a force's amplitude may be is more than the usual force, N: waves that
+    nearly cancel have any amplitude together, and such a bound is none.
+    """
+    dimensions = {p.dimension for t in effect.shapes(ANY) for p in t.affine if p.name in parameters}
+    amplitude = parameters.get("amplitude")
+    if amplitude is None or dimensions != {FORCE} or not nil(amplitude):
+        return False
+    return bool(float(amplitude.interval()[1]) > force)
 
 
 def _as_gain(more: Estimate) -> str:

@@ -40,6 +40,7 @@ from .effects.load_dependent_friction import (
     ReactionFriction as ReactionFriction,
 )
 from .effects.load_drift import LoadDrift as LoadDrift
+from .effects.local_force import LocalForce as LocalForce
 from .effects.parameter_step import ParameterStep as ParameterStep
 from .effects.periodic_disturbance import PeriodicDisturbance as PeriodicDisturbance
 from .effects.position_dependent_force_constant import (

@@ -203,7 +203,8 @@ class Effect:
     - `sharp`: its columns hold a derivative of the acceleration: what the encoder's noise makes of
       that is the noise that the controller answered, which explains force without physics.
     - `delays`: to first order it delays the force, so that force and motion are aligned without it.
-    - `leftover`: strong effects leave something of its shape.
+    - `leftover`: strong effects leave something of its shape. `local`: at one place, so that it may
+      be nearly all that they leave there.
     - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
     - `idealised`: models idealise it; what of it makes no more of the force than noise does is told
@@ -229,10 +230,11 @@ class Effect:
 
     How it is told:
 
-    - `sentence`: with parameters in braces; `variant`: another sentence where the name promises
-      more than the values hold. `sizes`: parameters of which only the most is known where other
-      terms could stand in for all of it. `moment`: the parameter that dates it; `lasting`: that by
-      which it is over again. `dates`: times, s, that a term holds as given numbers, by name.
+    - `sentence`: with parameters in braces, `{name:size}` without a sign; `variant`: another
+      sentence where the name promises more than the values hold. `sizes`: parameters of which only
+      the most is known where other terms could stand in for all of it. `moment`: the parameter that
+      dates it; `lasting`: that by which it is over again. `dates`: times, s, that a term holds as
+      given numbers, by name.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -257,6 +259,7 @@ class Effect:
     sharp: bool = False
     delays: bool = False
     leftover: bool = False
+    local: bool = False
     isolated: bool = False
     ubiquitous: bool = False
     idealised: bool = False

@@ -63,7 +63,7 @@ class Scales(NamedTuple):
 
 
 class Burden(NamedTuple):
-    """What a term takes for itself of a machine: the load behind a spring, the memory of a bump.
+    """What a term takes of a machine: the load behind a spring, the memory of a bump, a worn place.
 
     `inertia`, kg, and `friction`, N, of which a machine has no more; `give`, m, by which a spring
     gives way under that friction; `curved`: whether the friction is a part of a Stribeck curve;

@@ -6,6 +6,7 @@ arrived.
 """
 
 import dataclasses
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from ..predictions import with_predictions
 from ..problem import Problem, with_holdout
 from ..quantities import quantity
 from ..regression import Fit, fit
+from ..significance import FEWEST
 from . import limits
 from .preceding import p_value, with_preceding
 
@@ -39,7 +41,8 @@ BELOW = 0.1
 SPREAD = 0.25
 # A machine that is at its limit for most of the time does not do what it is told: the lower part of
 # the commands arrives, and the baseline is fitted to it first. Fitted to all of them it would err
-# by the excess, too, and could hide it.
+# by the excess, too, and could hide it. Where the axis mostly moves at constant speed, that part
+# holds friction alone and no inertia: then a quarter as many samples are left out, and so on.
 ARRIVES, ROUNDS = 1 - limits.MOST, 3
 # A node where the limit is reached holds samples below it too: levels a little higher are tried.
 NEAR = tuple(np.linspace(0.99, 1.05, 13))
@@ -74,21 +77,13 @@ def bounded(
     command = np.asarray(rows.motion.force, float)[moving]
     speed = np.asarray(rows.motion.velocity, float)[moving]
     size, side = np.abs(command), np.sign(command)
-    level, needed = float(np.quantile(size, ARRIVES)), command
-    for _ in range(ROUNDS):
-        below = _below(rows, level)
-        if len(below.rows) < FEWEST_ROWS:
-            return None
-        needed = side * _needed(rows, fit(base.terms, below, base.betas))[moving]
-        last = level
-        level, left = limits.cut(size, needed)
-        if left > SUSPECT:
-            return None
-        if level == last:
+    unit = motion.recording.unit_names["force"]
+    limit = None
+    for begin in _levels(size):
+        needed = _of_arriving(rows, base, moving, side, size, begin)
+        limit = None if needed is None else limits.limit_of(command, side * needed, speed, unit)
+        if limit is not None:
             break
-    if not _one_level(size, needed, level):
-        return None
-    limit = limits.limit_of(command, side * needed, speed, motion.recording.unit_names["force"])
     if limit is None:
         return None
     fits = {near: _cut_off(motion, problem, near * float(limit.value)) for near in NEAR}
@@ -115,6 +110,32 @@ def by_samples(bound: Bounded, commanded: Figures, arrived: Figures, reach: floa
     noise = arrived.floor(bound.beside, 2 * reach) ** 2
     before = commanded.here(bound.baseline) ** 2 - noise
     return arrived.here(bound.beside) ** 2 - noise < limits.LEAVES_IN_ALL * before
+
+
+def _levels(size: np.ndarray) -> list[float]:
+    """Levels of the command to begin with, N: half of the samples are beyond, an eighth, ..."""
+    beyond = ARRIVES ** np.arange(1, 1 + max(1, math.log(FEWEST / len(size), ARRIVES)), 2)
+    return list(dict.fromkeys(np.quantile(size, 1 - beyond).tolist()))
+
+
+def _of_arriving(
+    rows: Evidence, base: Fit, moving: np.ndarray, side: np.ndarray, size: np.ndarray, level: float
+) -> np.ndarray | None:
+    """What the motion needs in the command's direction, N, by rows whose commands all arrive, where
+    it is one value beyond a level. `level` to begin with.
+    """
+    for _ in range(ROUNDS):
+        below = _below(rows, level)
+        if len(below.rows) < FEWEST_ROWS:
+            return None
+        needed = side * _needed(rows, fit(base.terms, below, base.betas))[moving]
+        last = level
+        level, left = limits.cut(size, needed)
+        if left > SUSPECT:
+            return None
+        if level == last:
+            break
+    return needed if _one_level(size, needed, level) else None
 
 
 def _one_level(size: np.ndarray, needed: np.ndarray, level: float) -> bool:

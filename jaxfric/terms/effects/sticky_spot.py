@@ -1,5 +1,6 @@
-"""Extra friction at one place."""
+"""More or less friction at one place."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -8,12 +9,12 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect, View
+from ..effect import Effect, Extent, View
 from ..position import WITH_DIRECTION, shortest, stroke, within
-from ..sample import UNKNOWN, Parameter, Resolution, Sample
+from ..sample import UNKNOWN, Burden, Parameter, Resolution, Sample
 
 
-def _spot_bounds(scales):
+def spot_bounds(scales):
     """From two samples at the top speed to a quarter of the stroke, beyond which it is no spot."""
     return shortest(scales), 0.25 * stroke(scales)
 
@@ -23,13 +24,13 @@ def _spot_bounds(scales):
 _BY_WIDTH = Resolution(1, 1.5, None, 96, "spot_width")
 
 
-_WIDTH = Resolution(0, 2, None, 12)
+SPOT_WIDTH = Resolution(0, 2, None, 12)
 
 
 class StickySpot(AbstractLaw):
-    """Extra friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
+    """More or, where A < 0, less friction at one place: F = A sign(v) exp(−(x − x₀)²/(2w²)).
 
-    `spot_position` x₀, m; `spot_width` w, m.
+    `spot_position` x₀, m; `spot_width` w, m. Less is no more than the friction that there is.
     """
 
     spot_position: Float[Array, ""] | float = UNKNOWN
@@ -38,7 +39,7 @@ class StickySpot(AbstractLaw):
     affine: ClassVar = (Parameter("spot_force", FORCE),)
     nonlinear: ClassVar = (
         Parameter("spot_position", POSITION, within, logarithmic=False, resolution=_BY_WIDTH),
-        Parameter("spot_width", POSITION, _spot_bounds, resolution=_WIDTH),
+        Parameter("spot_width", POSITION, spot_bounds, resolution=SPOT_WIDTH),
     )
     coordinates: ClassVar = WITH_DIRECTION
 
@@ -50,18 +51,40 @@ class StickySpot(AbstractLaw):
         away = f"((x - {place}) / {width})"
         return (f"{s.call('sign', 'v')} * {s.call('exp', f'-0.5 * {away} * {away}')}",)
 
+    def burden(self, beta, alpha) -> Burden | None:
+        return Burden(0.0, -float(alpha[0])) if alpha[0] < 0 else None
+
     def extent(self, values):
         at, reach = values["spot_position"], 4 * values["spot_width"]
         return {"position": (at - reach, at + reach)}
 
 
-def spots(term: AbstractTerm, view: View) -> np.ndarray:
-    """Places one width apart, for widths by factors of 1.6 from what the kernel resolves."""
+def places(view: View, apart: float, count: int) -> np.ndarray:
+    """Places so many widths apart, for some widths from what the kernel resolves, `(G, 2)`."""
     low, high = float(view.limits.low), float(view.limits.high)
     stroke = high - low
     narrowest = np.clip(0.5 * view.speed * view.reach, stroke / 100, stroke / 8)
-    widths = np.geomspace(narrowest, stroke / 4, 6)
-    return np.array([(at, w) for w in widths for at in np.arange(low + w / 2, high, w)])
+    widths = np.geomspace(narrowest, stroke / 4, count)
+    ends = [(low + 0.5 * apart * w, apart * w) for w in widths]
+    return np.array([
+        (at, w)
+        for w, (first, step) in zip(widths, ends, strict=True)
+        for at in np.arange(first, high, step)
+    ])  # fmt: skip
+
+
+def spots(term: AbstractTerm, view: View) -> np.ndarray:
+    """Places one width apart, for widths by factors of 1.6 from what the kernel resolves."""
+    return places(view, 1.0, 6)
+
+
+def _slippery(values: Mapping[str, float], extent: Extent) -> str | None:
+    if values["spot_force"] >= 0:
+        return None
+    return (
+        "Friction is lower by {spot_force:size} around {spot_position}, half-width {spot_width}: a "
+        "worn or a well-greased place"
+    )
 
 
 STICKY_SPOT = Effect(
@@ -74,6 +97,6 @@ STICKY_SPOT = Effect(
     needs=frozenset({"position"}),
     confusable_with=("position_dependent_friction", "disturbance_pulses"),
     separate_by="Cross the place slowly, both ways, several times.",
-    positive=True,
     grid=spots,
+    variant=_slippery,
 )
