@@ -14,7 +14,7 @@ from ..position import WITH_DIRECTION, shortest, stroke, within
 from ..sample import UNKNOWN, Burden, Parameter, Resolution, Sample
 
 
-def spot_bounds(scales):
+def _spot_bounds(scales):
     """From two samples at the top speed to a quarter of the stroke, beyond which it is no spot."""
     return shortest(scales), 0.25 * stroke(scales)
 
@@ -39,7 +39,7 @@ class StickySpot(AbstractLaw):
     affine: ClassVar = (Parameter("spot_force", FORCE),)
     nonlinear: ClassVar = (
         Parameter("spot_position", POSITION, within, logarithmic=False, resolution=_BY_WIDTH),
-        Parameter("spot_width", POSITION, spot_bounds, resolution=SPOT_WIDTH),
+        Parameter("spot_width", POSITION, _spot_bounds, resolution=SPOT_WIDTH),
     )
     coordinates: ClassVar = WITH_DIRECTION
 
