@@ -532,7 +532,7 @@ class Reported:
 
 @pytest.mark.parametrize(("moment", "isolated"), [("step_time", False), ("", True)])
 def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, moment, isolated):
-    """Beside its moment's uncertainty; what has no moment stays."""
+    """Beside its moment's uncertainty, or at a moment that may be any; what has no moment stays."""
 
     class Dated(Reported):
         def __init__(self, names, wrong):
@@ -547,7 +547,10 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         def without(self, number):
             return Dated(self.names[:number] + self.names[number + 1 :], self.wrong)
 
-    errors = {"a": 1.0, "b": 0.6, "c": 0.1}
+    errors = {"a": 1.0, "b": 0.6, "c": 0.1, "d": 0.1}
+
+    def anytime(some, number):
+        return bool(moment) and some.names[number] == "d"
 
     def estimated(some):
         return [
@@ -556,7 +559,8 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         ]
 
     monkeypatch.setattr(improvement, "estimated", estimated)
-    assert improvement.without_unsure(Dated("abc", "")).names == "ac"
+    monkeypatch.setattr(improvement, "anytime", anytime)
+    assert improvement.without_unsure(Dated("abcd", "")).names == ("ac" if moment else "acd")
 
 
 def test_the_change_of_a_simulators_value_is_tested_by_the_interval_that_is_told():
