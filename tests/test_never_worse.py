@@ -547,10 +547,7 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         def without(self, number):
             return Dated(self.names[:number] + self.names[number + 1 :], self.wrong)
 
-    errors = {"a": 1.0, "b": 0.6, "c": 0.1, "d": 0.1}
-
-    def anytime(some, number):
-        return bool(moment) and some.names[number] == "d"
+    errors = {"a": 1.0, "b": 0.6, "c": 0.1}
 
     def estimated(some):
         return [
@@ -559,8 +556,15 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         ]
 
     monkeypatch.setattr(improvement, "estimated", estimated)
-    monkeypatch.setattr(improvement, "anytime", anytime)
-    assert improvement.without_unsure(Dated("abcd", "")).names == ("ac" if moment else "acd")
+    for any_of, left in (("", "ac"), ("c", "a" if moment else "ac")):
+
+        def anytime(some, number, any_of=any_of):
+            return bool(
+                some.selection.selected[number].effect.moment and some.names[number] in any_of
+            )
+
+        monkeypatch.setattr(improvement, "anytime", anytime)
+        assert improvement.without_unsure(Dated("abc", "")).names == left
 
 
 def test_the_change_of_a_simulators_value_is_tested_by_the_interval_that_is_told():
