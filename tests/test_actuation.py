@@ -94,7 +94,8 @@ def test_the_bias_is_a_column_of_what_the_command_makes_too_much(number):
     difference = np.asarray(first.driven(recording).force - second.driven(recording).force)
     key = {0: "actuator/m/biasprm[0]", 1: "joint/hip/stiffness", 2: "joint/hip/damping"}[number]
     if number:  # at the joint, which is named first, the other way and without the gear
-        assert first.attributes()[key].alike == (f"biasprm[{number}] of actuator m",)
+        (alike,) = first.attributes()[key].alike
+        assert str(alike) == f"biasprm[{number}] of actuator m"
     column = first.columns.makers[key](first.along(recording))[0]
     expected = 0.05 * (1.0 if number == 0 else -4.0) * column
     size = np.abs(expected).max()

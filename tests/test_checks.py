@@ -228,6 +228,10 @@ def test_one_speed_and_a_broken_clock():
     parts = [x[moves] for x in (time, force, sawtooth, time // 1.0)]
     steady = jf.Recording(*parts[:3], segment=parts[3].astype(int))
     assert "one_speed" in names(steady)
+    # A few fast moves tell the slope.
+    few = parts[0] % 2.0 < 0.1
+    faster = dataclasses.replace(steady, position=parts[2] * np.where(few, 20.0, 1.0))
+    assert "one_speed" not in names(faster)
     packets = np.repeat(np.arange(800) * 0.01, 10) + np.tile(np.arange(10) * 1e-5, 800)
     broken = jf.Recording(time=packets, force=force, position=sawtooth)
     assert "broken_clock" in names(broken)

@@ -286,6 +286,19 @@ def test_any_term_is_found_from_the_default_bounds(name):
     assert not misses(found, model)
 
 
+def test_a_law_of_many_numbers_has_few_places_spread_evenly():
+    parameters = T.DampedBacklash().nonlinear
+    axes = [grids.Axis(points) for points in (13, 17, 17, 5, 5)]  # 94 000 combinations
+    places, cells = grids.fractions(parameters, axes)
+    assert places.shape == cells.shape == (grids.TOGETHER, 5)
+    assert 0 <= places.min() and places.max() <= 1
+    # Each quarter of each parameter has its share of them.
+    counts = [np.histogram(each, 4, (0, 1))[0] / len(places) for each in places.T]
+    np.testing.assert_allclose(counts, 0.25, atol=0.005)
+    few, _ = grids.fractions(parameters[:3], axes[:3])
+    assert len(few) == 13 * 17 * 17
+
+
 def test_each_direction_keeps_its_own_parameters_of_two_laws():
     """β is sorted by laws, the search by directions."""
     gaussian = models.gaussian()

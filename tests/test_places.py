@@ -47,22 +47,6 @@ def test_no_place_has_less_friction_than_none():
     assert terms.StickySpot().burden(beta, np.array([20.0])) is None
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("inertia", "friction", "reach", "at", "width", "size"),
-    [(40.0, 30.0, 0.8, -0.15, 0.05, -12.0), (3e-4, 0.02, 30.0, 6.0, 1.5, -0.012)],
-)
-def test_a_worn_place_is_found(inertia, friction, reach, at, width, size):
-    spot = terms.StickySpot(at, width)
-    runs = [axis(inertia, friction, reach, spot, (size,), seed=seed) for seed in (0, 1)]
-    found = explain(runs[0], models.gaussian(), runs[1])
-    assert [each.effect for each in found.findings] == ["sticky_spot"]
-    values = found.findings[0].parameters
-    assert float(values["spot_force"].value) == pytest.approx(size, rel=0.1)
-    assert float(values["spot_position"].value) == pytest.approx(at, abs=0.2 * width)
-    assert found.verdict == "explained"
-
-
 def test_a_force_at_one_place_is_told_by_where_it_pulls():
     """Where the axis needs a force upwards, one acts downwards."""
     up = {
@@ -78,15 +62,19 @@ def test_a_force_at_one_place_is_told_by_where_it_pulls():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("inertia", "friction", "reach", "at", "width", "size"),
-    [(40.0, 30.0, 0.8, 0.1, 0.06, 8.0), (3e-4, 0.02, 30.0, -5.0, 2.0, -0.01)],
+    ("law", "machine", "at", "width", "size"),
+    [
+        (terms.StickySpot, (40.0, 30.0, 0.8), -0.15, 0.05, -12.0),  # less friction
+        (terms.StickySpot, (3e-4, 0.02, 30.0), 6.0, 1.5, -0.012),
+        (terms.LocalForce, (40.0, 30.0, 0.8), 0.1, 0.06, 8.0),  # and no wave
+        (terms.LocalForce, (3e-4, 0.02, 30.0), -5.0, 2.0, -0.01),
+    ],
 )
-def test_a_force_at_one_place_is_no_wave(inertia, friction, reach, at, width, size):
-    hump = terms.LocalForce(at, width)
-    runs = [axis(inertia, friction, reach, hump, (size,), seed=seed) for seed in (0, 1)]
+def test_what_acts_at_one_place_is_found(law, machine, at, width, size):
+    runs = [axis(*machine, law(at, width), (size,), seed=seed) for seed in (0, 1)]
     found = explain(runs[0], models.gaussian(), runs[1])
-    assert [each.effect for each in found.findings] == ["local_force"]
-    values = found.findings[0].parameters
-    assert float(values["local_force"].value) == pytest.approx(size, rel=0.1)
-    assert float(values["local_force_position"].value) == pytest.approx(at, abs=0.2 * width)
-    assert found.verdict == "explained"
+    (finding,) = found.findings
+    force, place = law.affine[0].name, law.nonlinear[0].name
+    assert EFFECTS[finding.effect].laws == (law,) and found.verdict == "explained"
+    assert float(finding.parameters[force].value) == pytest.approx(size, rel=0.1)
+    assert float(finding.parameters[place].value) == pytest.approx(at, abs=0.2 * width)

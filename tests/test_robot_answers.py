@@ -169,7 +169,10 @@ def test_joints_that_agree_on_a_body_or_tell_of_two_moments_do_not_contradict():
 
 
 def armed(name, alike, instead=()):
-    """A joint that by itself finds its armature wrong, and what would do as well."""
+    """A joint that by itself finds its armature wrong; a value of the owners `alike`, or the mass
+    of the bodies `instead`, would do as well.
+    """
+    alike = tuple(Attribute(owner, "mass", 1.0, "kg") for owner in alike)
     key = f"joint/{name}/armature"
     own = {key: Attribute(f"joint {name}", "armature", 5.0, "kg", alike)}
     own |= {f"body/{body}/mass": Attribute(f"body {body}", "mass", 1.0, "kg") for body in instead}
@@ -181,11 +184,11 @@ def armed(name, alike, instead=()):
 
 
 def test_all_joints_are_asked_where_one_body_may_stand_for_values_of_two():
-    x = armed("x", ("mass of body bridge", "mass of body carriage"))
-    y = armed("y", ("damping of joint y",), ("carriage",))
+    x = armed("x", ("body bridge", "body carriage"))
+    y = armed("y", ("joint y",), ("carriage",))
     assert together._by_one_body([x, y]) == {"body carriage"}
     assert not together._by_one_body([x])
-    assert not together._by_one_body([x, armed("y", ("mass of body ram",))])
+    assert not together._by_one_body([x, armed("y", ("body ram",))])
 
 
 def test_a_body_s_value_counts_once_of_all_joints():

@@ -24,9 +24,9 @@ FASTEST = {"m": 50.0, "rad": 5e4}
 NOISE_ONLY = 0.5
 # Of a motion that is sampled once in half a second no drive's friction can be told.
 SLOWEST_LOG = 0.5
-# Eight tenths of the means of the speed within a tenth of it leave friction's slope and the
-# acceleration to the noise.
-ONE_SPEED = 1.1
+# Means of the speed within a tenth of it, but for a tenth that is slower (ramps) and a fiftieth
+# that is faster (overshoot), leave friction's slope and the acceleration to the noise.
+ONE_SPEED, BETWEEN = 1.1, (0.1, 0.98)
 # Moving is what is faster than a twentieth of the top speed; of a direction that takes less than a
 # hundredth of that there are but the turns of the other one.
 MOVING, RARE = 0.05, 0.01
@@ -79,8 +79,7 @@ def speed_faults(velocity: np.ndarray, valid: np.ndarray, unit: str) -> dict[str
     whole = valid[: count * SPAN].reshape(count, SPAN).all(axis=1)
     means = velocity[: count * SPAN].reshape(count, SPAN)[whole].mean(axis=1)
     moving = np.abs(means[np.abs(means) > MOVING * top])
-    # Fast moves tell a slope though they are few; ramps up to the one speed hardly do.
-    low, high = np.quantile(moving, (0.1, 0.98)) if len(moving) > LONE else (0.0, 1.0)
+    low, high = np.quantile(moving, BETWEEN) if len(moving) > LONE else (0.0, 1.0)
     if high < ONE_SPEED * low:
         found["one_speed"] = high / low - 1
     slips = velocity[valid & (np.abs(velocity) > MOVING * top)]

@@ -14,6 +14,7 @@ from ..data.tables import load
 from ..explanation import Explanation, explain
 from ..explanation.sanity import Check, CheckedSimulator, Part, check_logs, rows_of
 from ..simulators import Mujoco
+from ..simulators.multibody import Standing
 from ..simulators.patching import folder_of
 from ..terms.effects.position_zero import POSITION_ZERO
 from .commands import read
@@ -74,7 +75,7 @@ def _compared(simulator: Mujoco, logs: list[Recording]) -> tuple[list[Recording]
     try:
         for held in logs[1:]:
             simulator.beside(held)
-    except ValueError:
+    except Standing:
         text = (
             f"{logs[1].source}: the joint {simulator.joint} stands there, or is at a limit of the "
             "model, so that its answer is not tested on held-out motion."

@@ -111,11 +111,11 @@ def _could_be_of(joint: Joint) -> set[str]:
     findings = [f for f in joint.told.findings if f.effect == MISMATCH] if joint.told else []
     own = joint.simulator.attributes() if joint.simulator else {}
     keys = [key for f in findings for others in f.instead.values() for key in others]
-    owners = {own[key].owner for key in keys if key in own}
-    alike = [words for f in findings for key in f.parameters if key in own
-             for words in own[key].alike]  # fmt: skip
-    owners |= {words.rpartition(" of ")[2] for words in alike}
-    return {owner for owner in owners if owner.startswith("body ")}
+    others = [own[key] for key in keys if key in own]
+    others += [
+        each for f in findings for key in f.parameters if key in own for each in own[key].alike
+    ]
+    return {each.owner for each in others if each.owner.startswith("body ")}
 
 
 def _count(joints: Sequence[Joint]) -> int:

@@ -296,7 +296,7 @@ def _times(m: Moved) -> str:
 def _doubt(name: str, instead: Mapping[str, tuple[str, ...]], own: Mapping[str, Attribute]) -> str:
     """What else it may be: what no motion tells from it, and what this one does not."""
     key = GAIN if name == _gear(own) else name
-    texts, alike = [], own[key].alike if key in own else ()
+    texts, alike = [], [str(each) for each in own[key].alike] if key in own else []
     if alike:
         said = listed(alike, f"{len(alike) - MOST} others")
         texts.append(f"or {said}: no motion of this joint tells them apart")

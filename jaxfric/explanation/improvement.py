@@ -155,8 +155,8 @@ def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
     that may have been at any moment, and without pushes all of which may be none.
 
     What a change is told by is the value before and after: an interval that holds both says
-    nothing. Pushes are told by their sizes alone. `as_told`: a change is tested by the interval
-    that is told, as of a simulator's value; that is wider where it acts in few blocks.
+    nothing. Pushes are told by their sizes alone, and tested by the intervals that are told, which
+    are wider where one acts in few blocks. `as_told`: so are changes, as of a simulator's value.
     """
     while True:
         selected = findings.selection.selected

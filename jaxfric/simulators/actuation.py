@@ -223,9 +223,9 @@ def _smooth(values: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray
 Made = Mapping[str, tuple[Attribute, Callable[[Along], Parts]]]
 
 
-def columns(own: Actuator, joint: int, sprung: str) -> Made:
+def columns(own: Actuator, joint: int, sprung: Attribute | None) -> Made:
     """The actuator's bias with its columns: by how much the force that it makes of the recorded
-    command is larger than the joint's. `sprung`: the joint's spring in words, where there is one.
+    command is larger than the joint's. `sprung`: where the joint's spring rests, if it has one.
     """
     owner = f"actuator {own.name}"
     tied = {own.servo} - {0}

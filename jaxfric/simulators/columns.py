@@ -65,7 +65,7 @@ def distinct(
             attributes[key], directions[key] = attribute, direction
         else:
             own = attributes[twin]
-            attributes[twin] = own._replace(alike=(*own.alike, str(attribute)))
+            attributes[twin] = own._replace(alike=(*own.alike, attribute))
     if settled:
         attributes = {key: each for key, each in attributes.items() if key[:5] != "body/"}
     makers = {key: every[key][1] for key in attributes}
@@ -79,7 +79,8 @@ def distinct(
 def _of_actuator(every, actuator: Actuator, joint: int, name: str):
     """With the values of an actuator in place of the force's gain, the joint's own values first."""
     spring = every[f"joint/{name}/stiffness"][0]
-    sprung = f"springref of joint {name}" if spring.value else ""
+    rests = spring._replace(what="springref", value=spring.rest, alike=())
+    sprung = rests if spring.value else None
     gained = {
         GAIN: (actuation.gain(actuator), lambda s: actuation.by_gain(actuator, joint, s)),
         **actuation.columns(actuator, joint, sprung),

@@ -34,8 +34,8 @@ class Attribute(NamedTuple):
     """A parameter of a simulator in its own words.
 
     - `owner`: what it belongs to, "joint elbow" or "body forearm"; `what`: "damping"; `value` in
-      the simulator, `unit`; `alike`: others whose force is the same at this joint but for a factor,
-      in words; `rest`: where a spring's force is zero; `between`: of a time, the samples that it is
+      the simulator, `unit`; `alike`: others whose force is the same at this joint but for a factor;
+      `rest`: where a spring's force is zero; `between`: of a time, the samples that it is
       known from, s; of another value, an interval that it is anywhere within.
     """
 
@@ -43,7 +43,7 @@ class Attribute(NamedTuple):
     what: str
     value: float
     unit: str
-    alike: tuple[str, ...] = ()
+    alike: tuple["Attribute", ...] = ()
     rest: float = 0.0
     between: float = 0.0
 

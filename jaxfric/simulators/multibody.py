@@ -36,6 +36,12 @@ ROUNDING = 1e-6
 MOSTLY = 0.5
 
 
+class Standing(ValueError):
+    """A joint stands, or is at a limit of the model, in a whole recording: there is nothing to
+    compare.
+    """
+
+
 class Mujoco(AbstractSimulator):
     """The force that a MuJoCo model needs at one joint for a recorded motion.
 
@@ -155,7 +161,7 @@ class Mujoco(AbstractSimulator):
         if np.mean(touches := self.touches(recording)) < MOSTLY:
             gone |= touches
         if (gone | soft).all():
-            raise ValueError(
+            raise Standing(
                 f"{recording.source or 'The recording'}: the joint {self.joint} stands, or is at a "
                 "limit of the model, in all samples, so that nothing can be compared. Is it the "
                 "column of a joint that moved?"

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from ..units import FORCE, Dimension
 from .base import AbstractLaw
 from .sample import Parameter, Resolution, Sample
-from .text import literal
+from .text import Syntax, literal
 
 POSITION_ONLY = frozenset({"position"})
 WITH_DIRECTION = frozenset({"position", "velocity"})
@@ -59,6 +59,22 @@ def wave(name: str, dimension: Dimension, harmonics: int = 1) -> tuple[Parameter
 def waves(argument, harmonics: int = 1):
     """sin(n θ) and cos(n θ) of an angle θ = `argument`, rad, for n = 1 … `harmonics`."""
     return tuple(f(n * argument) for n in range(1, harmonics + 1) for f in (jnp.sin, jnp.cos))
+
+
+def hump(position, place, width):
+    """exp(−(x − x₀)²/(2w²)) of a `place` x₀ and a half-width w, m."""
+    return jnp.exp(-0.5 * ((position - place) / width) ** 2)
+
+
+def hump_text(s: Syntax, place: str, width: str) -> str:
+    """The same in a language's own words, of the position x."""
+    away = f"((x - {place}) / {width})"
+    return s.call("exp", f"-0.5 * {away} * {away}")
+
+
+def hump_extent(place: float, width: float) -> dict[str, tuple[float, float]]:
+    """Where a hump is more than 3e-4 of its height."""
+    return {"position": (place - 4 * width, place + 4 * width)}
 
 
 class Gravity(AbstractLaw):

@@ -44,9 +44,9 @@ SPREAD = 0.25
 # by the excess, too, and could hide it. Where the axis mostly moves at constant speed, that part
 # holds friction alone and no inertia: then a quarter as many samples are left out, and so on.
 ARRIVES, ROUNDS = 1 - limits.MOST, 3
-# Of few rows beyond a limit the baseline that is fitted to all of them errs by most of the excess:
-# there it leaves at least four times what it does below, in power. Noise that grows with the force
-# makes two to three.
+# Where an eighth of the rows or fewer are beyond a limit, the fit to all of them may move half of
+# what it leaves to as many rows below: those beyond then have seven times the power of the others,
+# and four times where noise is as large as what is left of those. With less, three fits are spared.
 ERRS = 4.0
 # A node where the limit is reached holds samples below it too: levels a little higher are tried.
 NEAR = tuple(np.linspace(0.99, 1.05, 13))

@@ -33,8 +33,9 @@ UNKNOWN = 2.0
 LEAST = 2
 # The speed, in parts of the slowest that is told from rest, at which friction is that of rest.
 AT_REST = 1e-3
-# Speeds at which dry friction is asked for, and the part of a speed over which a slope is taken.
-SPEEDS, CLOSE = 8, 0.02
+# Speeds between which dry friction is asked for: of the usual range, a hundredfold, each is twice
+# the last, as over a bump's flank (`checks/misfit.py`).
+SPEEDS = 8
 
 
 class Stop(NamedTuple):
@@ -147,19 +148,17 @@ def _standing(rows: Evidence, base: Fit) -> _Standing:
     def friction(speed: float) -> np.ndarray:
         return (at_speed(speed) - at_speed(-speed)) / 2
 
-    def dry(speed: float) -> np.ndarray:
-        """Friction without what grows with the speed: its tangent's value at zero."""
-        here = friction(speed)
-        return here - (friction((1 + CLOSE) * speed) - here) / CLOSE
-
-    forward, back = at_speed(slowest), at_speed(-slowest)
     # A curve that falls towards rest, as one bent to what the baseline lacks, is none of an axis:
-    # friction holds at least what it does in slip at any speed.
+    # friction holds at least what is dry of it in slip at any speed, a chord's value at zero.
     speeds = np.geomspace(slowest, max(rows.limits.fastest, 2 * slowest), SPEEDS)
-    slip = np.maximum(np.max([(forward - back) / 2, *map(dry, speeds)], axis=0), 0.0)
+    curve = np.array([friction(speed) for speed in speeds])
+    slopes = np.diff(curve, axis=0) / np.diff(speeds)[:, None]
+    dry = curve[:-1] - slopes * speeds[:-1, None]
+    slip = np.maximum(np.max([curve[0], *dry], axis=0), 0.0)
+    even = (at_speed(slowest) + at_speed(-slowest)) / 2
     momentum = _force(base, rows.motion)[1]
     force = every.project(np.asarray(rows.motion.force, float))
-    beyond = force - every.project(np.zeros_like(speed), momentum) - (forward + back) / 2
+    beyond = force - every.project(np.zeros_like(speed), momentum) - even
     return _Standing(
         np.asarray(rows.motion.time, float)[centre],
         every.project(np.asarray(rows.motion.position, float)),

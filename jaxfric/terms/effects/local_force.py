@@ -2,14 +2,13 @@
 
 from typing import ClassVar
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, View
-from ..position import POSITION_ONLY, shortest, stroke
+from ..position import POSITION_ONLY, hump, hump_extent, hump_text, shortest, stroke
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
 from .sticky_spot import SPOT_WIDTH, places
 
@@ -48,16 +47,13 @@ class LocalForce(AbstractLaw):
     coordinates: ClassVar = POSITION_ONLY
 
     def law(self, sample: Sample):
-        distance = (sample.position - self.local_force_position) / self.local_force_width
-        return (jnp.exp(-0.5 * distance**2),)
+        return (hump(sample.position, self.local_force_position, self.local_force_width),)
 
     def text(self, s, place, width):
-        away = f"((x - {place}) / {width})"
-        return (s.call("exp", f"-0.5 * {away} * {away}"),)
+        return (hump_text(s, place, width),)
 
     def extent(self, values):
-        at, reach = values["local_force_position"], 4 * values["local_force_width"]
-        return {"position": (at - reach, at + reach)}
+        return hump_extent(values["local_force_position"], values["local_force_width"])
 
 
 def _places(term: AbstractTerm, view: View) -> np.ndarray:

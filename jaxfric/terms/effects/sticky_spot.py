@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
 from ..effect import Effect, Extent, View
-from ..position import WITH_DIRECTION, shortest, stroke, within
+from ..position import WITH_DIRECTION, hump, hump_extent, hump_text, shortest, stroke, within
 from ..sample import UNKNOWN, Burden, Parameter, Resolution, Sample
 
 
@@ -44,19 +44,17 @@ class StickySpot(AbstractLaw):
     coordinates: ClassVar = WITH_DIRECTION
 
     def law(self, sample: Sample):
-        distance = (sample.position - self.spot_position) / self.spot_width
-        return (jnp.sign(sample.velocity) * jnp.exp(-0.5 * distance**2),)
+        spot = hump(sample.position, self.spot_position, self.spot_width)
+        return (jnp.sign(sample.velocity) * spot,)
 
     def text(self, s, place, width):
-        away = f"((x - {place}) / {width})"
-        return (f"{s.call('sign', 'v')} * {s.call('exp', f'-0.5 * {away} * {away}')}",)
+        return (f"{s.call('sign', 'v')} * {hump_text(s, place, width)}",)
 
     def burden(self, beta, alpha) -> Burden | None:
         return Burden(0.0, -float(alpha[0])) if alpha[0] < 0 else None
 
     def extent(self, values):
-        at, reach = values["spot_position"], 4 * values["spot_width"]
-        return {"position": (at - reach, at + reach)}
+        return hump_extent(values["spot_position"], values["spot_width"])
 
 
 def places(view: View, apart: float, count: int) -> np.ndarray:
