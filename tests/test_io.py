@@ -52,6 +52,44 @@ def save(path, columns):
 # ---- formats ----
 
 
+def frame(columns, index=None, name=None):
+    """A data frame: columns by name, and an index of its rows."""
+    rows = len(next(iter(columns.values())))
+    values = np.arange(rows) if index is None else index
+    index = type("Index", (), {"name": name, "__array__": lambda *_, **__: values})()
+    return type("Frame", (dict,), {"columns": list(columns), "index": index})(columns)
+
+
+def test_columns_in_memory_are_read_as_a_file_of_them(tmp_path):
+    """A cell that is no number, and stamps that scatter, are put in order."""
+    ticks, columns = trembling(1e-7)
+    off = columns(ticks)
+    off["tau"][90] = np.nan
+    from_file, told = io.read_with_notes(save(tmp_path / "log.npz", off))
+    assert len(told) == 2
+    for memory in (off, frame(off)):
+        recording, notes = io.read_with_notes(memory, served=True)
+        assert notes[1:] == told and "time from t" in notes[0]
+        assert recording.source == "(table in memory)" and not recording.sha256
+        for name in ("time", "position", "force", "mask"):
+            np.testing.assert_array_equal(getattr(recording, name), getattr(from_file, name))
+
+
+def test_an_index_of_moments_is_the_clock():
+    whole = log()
+    stamps = np.datetime64("2026-03-01T12:00", "ns") + np.rint(1e9 * whole.pop("time")).astype(int)
+    recording = io.read(frame(whole, stamps))
+    assert np.ptp(recording.time) == pytest.approx(0.199)
+    named = io.read(frame(whole, 1e-3 * np.arange(200), name="seconds"))
+    assert np.ptp(named.time) == pytest.approx(0.199)
+
+
+@pytest.mark.parametrize("what", [3, [1.0, 2.0], {}, {"t": 3.0}])
+def test_what_is_no_table_is_refused(what):
+    with pytest.raises(ValueError, match="in memory.*holds no columns. Give the path of a log"):
+        io.read(what)
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".npz", ".mat", ".h5mat", ".parquet"])
 @settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())

@@ -22,7 +22,7 @@ ROLES = (
 # `time_stamp`, `TimeStamp` and `time stamp` are all `timestamp`; symbols are taken to the letter,
 # for `qd` is a velocity in most logs but `q_d` is a desired position in some.
 _SYNONYMS = {
-    "time": "time times t timestamp tstamp elapsed elapsedtime seconds sec",
+    "time": "time times t timestamp stamp tstamp elapsed elapsedtime seconds sec",
     "position": "position pos q qm q_m x angle theta displacement encoder enc qpos jointangle "
     "angularposition rotorposition encoderposition",
     "velocity": "velocity vel velo v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "

@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -18,7 +19,7 @@ from .printable import encodable
 from .provenance import sha256
 from .recording import Recording
 from .spellings import unit_of
-from .tables import load
+from .tables import IN_MEMORY, in_memory, load
 from .turns import angles
 from .writing import (
     write_bytes as write_bytes,
@@ -32,7 +33,7 @@ _SIGNALS = ("time", "force", "position", "velocity")
 
 
 def read(
-    path: str | os.PathLike,
+    path: str | os.PathLike | Mapping[str, Any],
     *,
     columns: Mapping[str, str | None] | None = None,
     scale: Mapping[str, float] | None = None,
@@ -43,7 +44,8 @@ def read(
     rate: float | None = None,
     counts_per_rev: float | None = None,
 ) -> Recording:
-    """Read one log: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`, or a robot's bag (rosbag2, MCAP).
+    """Read one log: CSV, Parquet, MATLAB `.mat`, NumPy `.npz`, a robot's bag (rosbag2, MCAP), or
+    columns in memory: a mapping from names to arrays, or a frame of pandas or polars.
 
     What was put in order on the way (interruptions, invalid samples, a wrapped position) is told
     by `jaxfric.data.io.read_with_notes`, with what each repair changed and by how much.
@@ -65,6 +67,8 @@ def read(
     - `counts_per_rev`: encoder counts of a revolution; a position in counts becomes radians, or
       the `deg` or `rev` that `units` names, and a velocity in counts/s likewise.
 
+    A [`Recording`][] of your own arrays is taken as it is; a mapping of them is put in order here.
+
     **Returns:** a `Recording` with signals of shape `(N,)`, in jax's default float type.
 
     **Raises:** `ValueError` naming file, place, fault and remedy.
@@ -83,7 +87,7 @@ def read(
 
 
 def read_with_notes(
-    path: str | os.PathLike,
+    path: str | os.PathLike | Mapping[str, Any],
     *,
     columns: Mapping[str, str | None] | None = None,
     scale: Mapping[str, float] | None = None,
@@ -105,9 +109,12 @@ def read_with_notes(
 
     Row numbers in the notes count lines in a CSV file and samples, from 1, in the other formats.
     """
-    path, source = Path(path), encodable(os.fspath(path))
+    if isinstance(path, str | os.PathLike):
+        path, source = Path(path), encodable(os.fspath(path))
+        table = load(path, format)
+    else:
+        table, path, source = in_memory(path), Path(IN_MEMORY), IN_MEMORY
     scale, units, period = dict(scale or {}), dict(units or {}), dict(period or {})
-    table = load(path, format)
     own = list(table.columns)
     if rate is not None:
         table = clocked(table, rate, columns, source)

@@ -12,6 +12,10 @@ from .delimited import Table, arrow_column, read_csv
 from .heading import unique
 
 
+# What a table that is in no file is called in messages.
+IN_MEMORY = "(table in memory)"
+
+
 def optional(library: str, path: Path) -> Any:
     """An optional library, or a message that says what to install."""
     try:
@@ -53,6 +57,27 @@ def load(path: Path, format: str | None = None) -> Table:
         raise ValueError(
             f"{path}: the file cannot be read: {_sentence(error)} Is it whole, and yours to read?"
         ) from error
+
+
+def in_memory(table: Any) -> Table:
+    """The columns of a mapping from names to arrays, or of a frame of pandas or polars; where a
+    frame's rows have an index that has a name or is of moments, that is a column, too.
+
+    **Raises:** `ValueError` if it is no such thing, or holds no columns.
+    """
+    content = dict(table) if isinstance(table, Mapping) else {}
+    if hasattr(table, "columns"):
+        index = getattr(table, "index", None)
+        if index is not None and (index.name or np.asarray(index).dtype.kind == "M"):
+            content[str(index.name or "time")] = np.asarray(index)
+        content |= {str(name): np.asarray(table[name]) for name in table.columns}
+    columns = _vectors("", _named({name: np.asarray(c) for name, c in content.items()}))
+    if not columns:
+        raise ValueError(
+            f"{IN_MEMORY}: a {type(table).__name__} holds no columns. Give the path of a log, or a "
+            "mapping from names to arrays of equal length, or a frame of pandas or polars."
+        )
+    return Table(columns, 1, [])
 
 
 def _sentence(error: Exception) -> str:
