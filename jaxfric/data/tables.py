@@ -11,7 +11,6 @@ from . import bags, vectors
 from .delimited import Table, arrow_column, read_csv
 from .heading import unique
 
-
 # What a table that is in no file is called in messages.
 IN_MEMORY = "(table in memory)"
 
