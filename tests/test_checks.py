@@ -1,6 +1,7 @@
 """Faults of recordings and fits: each is found, told with its remedy, and not where it is not."""
 
 import dataclasses
+import re
 
 import jax
 import numpy as np
@@ -218,6 +219,31 @@ def test_a_recorded_velocity_with_spikes_and_a_motion_one_way():
 def test_few_samples_a_cycle_are_told():
     assert names(log(rate=12.0, seconds=60.0, velocity=False)) == ["coarse_sampling"]
     assert names(log(rate=20.0, seconds=60.0, counts=1e6, velocity=False)) == []
+
+
+@pytest.mark.parametrize("velocity", [False, True])
+def test_samples_that_are_not_taken_when_their_stamps_say(velocity):
+    """In either direction: the clock trembles, or what writes its stamps does. Stamps that are
+    right, a coarse encoder and one that is white are no jitter.
+    """
+    steady = np.arange(16000) / RATE
+    times = steady + 0.2e-3 * np.random.default_rng(3).uniform(-1, 1, len(steady))
+
+    def taken(at, stamps, noise=0.0, count=1e-7):
+        position = 0.2 * np.sin(4 * at) + 0.05 * np.sin(11 * at)
+        speed = 0.8 * np.cos(4 * at) + 0.55 * np.cos(11 * at)
+        position = position + noise * np.random.default_rng(4).normal(size=len(at))
+        force = 2 * np.gradient(speed, steady) + 8 * np.sign(speed) + 5 * speed
+        recorded = {"velocity": speed} if velocity else {}
+        return jf.Recording(stamps, force, count * np.rint(position / count), **recorded)
+
+    assert "clock_jitter" in names(taken(times, steady))
+    assert "clock_jitter" in names(taken(steady, times))
+    (told,) = (r for r in checks.inspect(taken(times, steady)) if r.name == "clock_jitter")
+    value = float(re.search(r"velocity times (\S+) s,", told.text)[1])
+    assert value == pytest.approx(0.2e-3 / np.sqrt(3), rel=0.15)
+    for other in (taken(times, times), taken(steady, steady, 1e-5), taken(steady, steady, 0, 1e-4)):
+        assert "clock_jitter" not in names(other)
 
 
 def test_one_speed_and_a_broken_clock():

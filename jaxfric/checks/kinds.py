@@ -207,6 +207,13 @@ KINDS = (
         "{value:.1%} of its size. Log faster, or log the drive's velocity.",
     ),
     Kind(
+        "clock_jitter",
+        False,
+        "The position scatters from sample to sample by its velocity times {value:.3g} s, at all "
+        "speeds alike: the samples were not taken at the times of their stamps. What a model leaves "
+        "grows with the speed for that, and is no friction. Log the time at which each is taken.",
+    ),
+    Kind(
         "few_samples_a_cycle",
         False,
         "The motion has {value:.1f} samples a cycle, so that friction and inertia are averaged "

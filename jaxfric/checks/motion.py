@@ -1,6 +1,8 @@
 """Faults that clock, position and velocity of a recording show by themselves, on the host."""
 
 import dataclasses
+from itertools import pairwise
+from math import comb
 
 import numpy as np
 
@@ -30,6 +32,15 @@ ONE_SPEED, BETWEEN = 1.1, (0.1, 0.98)
 # Moving is what is faster than a twentieth of the top speed; of a direction that takes less than a
 # hundredth of that there are but the turns of the other one.
 MOVING, RARE = 0.05, 0.01
+
+# A stamp that is off by a hundredth of a step puts as much error on a velocity (data/cleaning).
+# Scatter that is as many seconds of velocity in each of three octaves of speed, within a half, is
+# the clock's: an encoder's, which is as many metres, is four times as much between the outer two.
+# It is white, by fourth as by eighth differences, as no motion is; of so many samples an octave it
+# is known to a tenth.
+OFF, OCTAVES, STEADY, WHITE, ENOUGH = 0.01, 3, 1.5, 0.8, 100
+# So many samples of a long recording tell of its clock.
+CLOCK = 2**15
 
 
 def clock_faults(recording: Recording, clock: Clock) -> dict[str, float]:
@@ -103,6 +114,40 @@ def position_faults(recording: Recording, clock: Clock) -> dict[str, float]:
     if goal is not None and np.array_equal(np.asarray(goal, float), position, equal_nan=True):
         found["position_is_reference"] = 1.0
     return found
+
+
+def unsteady(recording: Recording, clock: Clock) -> dict[str, float]:
+    """By how many seconds of its velocity the position scatters about the stamps, as it does where
+    samples are not taken when these say.
+    """
+    position, time = (np.asarray(x, float)[:CLOCK] for x in (recording.position, recording.time))
+    linked = clock.linked[: len(position) - 1]
+    if len(position) <= OCTAVES * ENOUGH or not clock.interval > 0:
+        return {}
+    broken = np.pad(np.cumsum(~linked), (1, 0))
+    whole = broken[8:] == broken[:-8]
+    velocity = (position[8:] - position[:-8])[whole] / (time[8:] - time[:-8])[whole]
+    fourth, eighth = (_scatter(position, time, velocity, whole, order) for order in (4, 8))
+    speed = np.abs(velocity)
+    if not len(speed) or not np.mean(fourth) > 0.5 * OFF * clock.interval * np.mean(speed):
+        return {}
+    octaves = np.clip(np.quantile(speed, 0.98) * 2.0 ** -np.arange(OCTAVES + 1), 1e-300, None)
+    of = [(speed <= high) & (speed > low) for high, low in pairwise(octaves)]
+    if min(map(np.count_nonzero, of)) < ENOUGH:
+        return {}
+    times = np.array([np.mean(fourth[each]) / np.mean(speed[each]) for each in of])
+    white = np.array([np.mean(eighth[each]) / np.mean(fourth[each]) for each in of])
+    alike = max(times) < STEADY * min(times) and np.all(np.abs(np.log(white)) < -np.log(WHITE))
+    return {"clock_jitter": float(times[0])} if alike and times[0] > OFF * clock.interval else {}
+
+
+def _scatter(position, time, velocity, whole, order: int) -> np.ndarray:
+    """What differences of an order see of white noise, in its standard deviations on average,
+    less what the stamps make of the motion.
+    """
+    inner = slice(4 - order // 2, len(position) - 4 - order // 2)
+    seen, made = (np.diff(x, order)[inner][whole] for x in (position, time))
+    return np.abs(seen - velocity * made) * np.sqrt(np.pi / 2 / comb(2 * order, order))
 
 
 def derivative_faults(choice: signals.Choice, velocity: np.ndarray) -> dict[str, float]:

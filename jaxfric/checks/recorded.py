@@ -21,6 +21,7 @@ from .motion import (
     position_faults,
     smoothed,
     speed_faults,
+    unsteady,
 )
 from .screening import Rows, Suspect, suspects
 
@@ -82,7 +83,7 @@ class _Log(NamedTuple):
         recording = self.recording
         found: dict[str, float] = {}
         if recording.position is not None:
-            found |= position_faults(recording, self.clock)
+            found |= position_faults(recording, self.clock) | unsteady(recording, self.clock)
             if recording.velocity is not None:
                 found |= compared(recording, self.clock)
         ready = self.ready

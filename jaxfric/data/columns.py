@@ -23,8 +23,8 @@ ROLES = (
 # for `qd` is a velocity in most logs but `q_d` is a desired position in some.
 _SYNONYMS = {
     "time": "time times t timestamp stamp tstamp elapsed elapsedtime seconds sec",
-    "position": "position pos q qm q_m x angle theta displacement encoder enc qpos jointangle "
-    "angularposition rotorposition encoderposition",
+    "position": "position pos q qm q_m x y z angle theta displacement encoder enc qpos jointangle "
+    "angularposition rotorposition encoderposition azimuth elevation altitude height stroke",
     "velocity": "velocity vel velo v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
     "angularvelocity angularspeed thetadot dtheta rpm",
     "force": "force torque tau current u vir effort moment thrust f i iq i_q qaxiscurrent "
@@ -38,7 +38,7 @@ _SYNONYMS = {
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
 _MEASURED = frozenset(
     "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
-    "drive".split()
+    "drive actuator cylinder piston".split()
 )
 # How a signal was treated, in words behind its unit.
 _TREATED = frozenset({"filtered", "filt", "raw", "smoothed"})
