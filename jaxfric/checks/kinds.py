@@ -210,8 +210,9 @@ KINDS = (
         "clock_jitter",
         False,
         "The position scatters from sample to sample by its velocity times {value:.3g} s, at all "
-        "speeds alike: the samples were not taken at the times of their stamps. What a model leaves "
-        "grows with the speed for that, and is no friction. Log the time at which each is taken.",
+        "speeds alike: the samples were not taken at the times of their stamps. What a model "
+        "leaves grows with the speed for that, and is no friction. Log the time at which each is "
+        "taken.",
     ),
     Kind(
         "few_samples_a_cycle",
