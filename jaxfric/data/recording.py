@@ -25,6 +25,10 @@ PADDING = (1.0, 1.25, 1.5, 1.75, 2.0)
 
 def _array(value, dtype=None):
     """An array of jax; one of numpy is moved as it is, for which nothing is compiled."""
+    if isinstance(value, jax.Array):
+        wanted = jax.dtypes.canonicalize_dtype(value.dtype if dtype is None else dtype)
+        if value.dtype == wanted:
+            return value
     if isinstance(value, np.ndarray):
         return jax.device_put(value if dtype is None else value.astype(dtype, copy=False))
     return jnp.asarray(value, dtype)
