@@ -103,9 +103,10 @@ def elastic_joint(
         tried = [Trial(told, source, folder, name) for name in ([only] if only else _joints(told))]
         if not tried or not _felt(here, np.zeros_like(here.rows.target)):
             return None  # the values leave no more than a sensor resolves
-        best = min(tried, key=lambda trial: trial.coarse(here)[0])
+        coarse = [trial.coarse(here) for trial in tried]
+        best = min(range(len(tried)), key=lambda i: coarse[i][0])
         other = _other(told, width)
-        return _spring(best, here, other)
+        return _spring(tried[best], coarse[best][1], here, other)
 
 
 def _width(each: Told) -> int:
@@ -139,11 +140,13 @@ def _joints(told: Sequence[Told]) -> list[str]:
 
 
 def _spring(
-    trial: Trial, here: Recorded, other: Recorded | None
+    trial: Trial, start: np.ndarray, here: Recorded, other: Recorded | None
 ) -> ElasticJoint | Suspicion | None:
-    """The spring, where it is beyond noise and another recording or kernel bears it out."""
+    """The spring near a place, where it is beyond noise and another recording or kernel bears it
+    out.
+    """
     box = trial.nodes(here)[1]
-    found = trial.fitted(here, trial.coarse(here)[1], box)
+    found = trial.fitted(here, start, box)
     share = 1 - found.energy / float(here.least @ here.least)
     felt = _felt(here, found.left[: len(here.rows.target)])
     if share < LEAST_SHARE or not felt:
