@@ -54,7 +54,7 @@ def expected_noise(machine):
 # A wrong parameter and a zero belong to a model, not to a machine, a hard limit is a definition of
 # saturation, and how friction passes zero is drawn of every machine; machines whose mass or gain
 # changes while they run are not drawn yet: tests/test_moments.py plants those, and
-# tests/test_places.py a force at one place.
+# tests/test_places.py a force at one place, tests/test_encoder_and_gain.py what its name says.
 NOT_DRAWN = {
     "smooth_friction",
     "parameter_mismatch",
@@ -65,6 +65,8 @@ NOT_DRAWN = {
     "parameter_step",
     "disturbance_force",
     "local_force",
+    "encoder_error",
+    "gain_drift",
 }
 
 

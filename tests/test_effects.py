@@ -46,6 +46,8 @@ CASES = {
     "position_friction": (T.PositionDependentFriction(0.05), (0.9, 1.1)),
     "sticky_spot": (T.StickySpot(0.01, 0.003), (2.0,)),
     "local_force": (T.LocalForce(0.01, 0.003), (2.0,)),
+    "encoder": (T.EncoderError(0.06), (0.4, 0.5, 3.0, 2.0)),
+    "gain_drift": (T.GainDrift(4.0, start=-1.0), (0.2,)),
     "position_inertia": (T.PositionDependentInertia(0.06), (0.4, 0.5)),
     "load_friction": (T.LoadDependentFriction(), (0.1,)),
     "reaction_friction": (T.ReactionFriction(), (0.1,)),
@@ -734,6 +736,7 @@ def test_the_catalogue_holds_together():
         "compliance force_limit position_zero transport_delay actuator_lag clock sensor_filter "
         "actuator_deadband actuator_saturation "
         "position_dependent_force_constant "
+        "encoder_error gain_drift "
         "gain_asymmetry thermal_drift friction_step payload_change gain_step load_drift "
         "periodic_disturbance disturbance_force disturbance_pulses cross_axis parameter_step"
     )

@@ -1,6 +1,7 @@
 """Findings as they are reported: parameters with their errors, shares, sentences."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from ..identification.uncertainty import Estimate
 from ..terms.effect import Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
+from ..units import spell
 from . import parameters as spelled, verification
 from .acceptance import OF_BASE
 from .baseline import Baseline
@@ -43,7 +45,9 @@ REPHASED = (
 def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]]:
     """The findings, and the share of each beside all the others."""
     selection, evidence = findings.selection, findings.problem.evidence
-    values = estimated(findings)[selection.term_index(0) :]
+    estimates = estimated(findings)
+    values = estimates[selection.term_index(0) :]
+    extent = _extent(evidence, estimates[0])
     every = [_shares(findings, first, number) for number in range(len(values))]
     shares = [
         _shares(_without(findings, twins), first, number) if twins else every[number]
@@ -61,8 +65,9 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             parameters = dated(parameters, effect.moment, evidence)
             parameters = spanning(parameters, findings, number)
         parameters = parameters | _dates(effect, findings, number)
+        parameters = parameters | _derived(effect, parameters, extent, evidence)
         rivals = *selected.rivals, *map(spoken, selected.instead)
-        text = sentence(effect.name, parameters, share, rivals, _extent(evidence), together)
+        text = sentence(effect.name, parameters, share, rivals, extent, together)
         text += _overtone(effect, parameters, result)
         if rest:
             text += REST
@@ -212,11 +217,29 @@ def _without(findings: Findings, numbers: list[int]) -> Findings:
     return findings._replace(undelayed=undelayed)
 
 
-def _extent(evidence: Evidence) -> Extent:
-    """The range of the position and the usual force."""
+def _extent(evidence: Evidence, base: Mapping[str, Estimate]) -> Extent:
+    """The range of the position, the usual force, and the inertia by the `base`'s parameters."""
     limits = evidence.limits
     force = float(np.sqrt(np.mean(evidence.force**2)))
-    return Extent(float(limits.low), float(limits.high), force)
+    inertia = float(base["inertia"].value) if "inertia" in base else float("nan")
+    return Extent(float(limits.low), float(limits.high), force, inertia)
+
+
+def _derived(
+    effect: Effect, parameters: Mapping[str, Estimate], extent: Extent, evidence: Evidence
+) -> dict[str, Estimate]:
+    """Values that follow from the parameters, as well known as these."""
+    values = {name: float(estimate.value) for name, estimate in parameters.items()}
+    units = evidence.motion.unit_names
+    found = {}
+    for name, how in effect.derived(values, extent).items():
+        own = parameters[how.of]
+        found[name] = own._replace(
+            value=how.factor * own.value,
+            standard_error=abs(how.factor) * own.standard_error,
+            unit=spell(how.dimension, units),
+        )
+    return found
 
 
 def _shares(findings: Findings, first: Fit, number: int) -> tuple[float, float | None]:

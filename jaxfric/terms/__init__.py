@@ -25,9 +25,11 @@ from .effects.compliance import Compliance as Compliance, DryCompliance as DryCo
 from .effects.cross_axis import CrossAxis as CrossAxis, CrossForce as CrossForce
 from .effects.disturbance_force import DisturbanceForce as DisturbanceForce
 from .effects.disturbance_pulses import DisturbancePulses as DisturbancePulses
+from .effects.encoder_error import EncoderError as EncoderError
 from .effects.end_stop import EndStop as EndStop, LowerEndStop as LowerEndStop
 from .effects.frictional_lag import FrictionalLag as FrictionalLag
 from .effects.gain_asymmetry import GainAsymmetry as GainAsymmetry
+from .effects.gain_drift import GainDrift as GainDrift
 from .effects.gravity_unbalance import GravityUnbalance as GravityUnbalance
 from .effects.late import (
     ActuatorLag as ActuatorLag,

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ..data.recording import Recording
-from ..units import POSITION
+from ..units import POSITION, Dimension
 from .base import AbstractTerm
 from .sample import Scales
 
@@ -78,17 +78,27 @@ class Residual(NamedTuple):
 class Extent(NamedTuple):
     """Magnitudes of a recording that a sentence is measured by.
 
-    `low` and `high`: the range of the position, m; `force`: root mean square, N.
+    `low` and `high`: the range of the position, m; `force`: root mean square, N; `inertia` of the
+    axis by the model, kg, not a number where it has none.
     """
 
     low: float = 0.0
     high: float = float("inf")
     force: float = float("nan")
+    inertia: float = float("nan")
 
     @property
     def stroke(self) -> float:
         """The range of the position, m."""
         return self.high - self.low
+
+
+class Derived(NamedTuple):
+    """A value that follows from a parameter: `of` it, times a `factor`; its `dimension`."""
+
+    of: str
+    factor: float
+    dimension: Dimension
 
 
 def inside(term: AbstractTerm, limits: Scales, place: Float[np.ndarray, "... d"]) -> np.ndarray:
@@ -165,6 +175,10 @@ def _no_dates(term: AbstractTerm) -> dict[str, float]:
     return {}
 
 
+def _none_derived(values: Mapping[str, float], extent: Extent) -> dict[str, Derived]:
+    return {}
+
+
 def _no_variant(values: Mapping[str, float], extent: Extent) -> None:
     return None
 
@@ -234,7 +248,7 @@ class Effect:
       sentence where the name promises more than the values hold. `sizes`: parameters of which only
       the most is known where other terms could stand in for all of it. `moment`: the parameter that
       dates it; `lasting`: that by which it is over again. `dates`: times, s, that a term holds as
-      given numbers, by name.
+      given numbers, by name. `derived`: values that follow from its parameters, by name.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -282,6 +296,7 @@ class Effect:
     moment: str = ""
     lasting: str = ""
     dates: Callable[[Any], dict[str, float]] = _no_dates
+    derived: Callable[[Mapping[str, float], Extent], dict[str, Derived]] = _none_derived
     drawn: bool = True
 
     def __post_init__(self) -> None:

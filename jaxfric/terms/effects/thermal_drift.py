@@ -16,7 +16,7 @@ from ..text import signed
 from ..time import AbstractModulated
 
 
-def _constant_bounds(scales):
+def constants(scales):
     """A fiftieth to three times the record.
 
     Faster warming is over within a tenth of the record. Slower warming falls by x = 1/3 of an
@@ -34,7 +34,7 @@ class ThermalDrift(AbstractModulated):
     term: AbstractTerm = Viscous()
     time_constant: Float[Array, ""] | float = UNKNOWN
     start: float = eqx.field(static=True, default=0.0)
-    of_time: ClassVar = (Parameter("time_constant", TIME, _constant_bounds),)
+    of_time: ClassVar = (Parameter("time_constant", TIME, constants),)
     prefix: ClassVar = "thermal"
 
     def factor(self, time: Float[Array, " N"]) -> Float[Array, " N"]:
@@ -73,7 +73,7 @@ THERMAL_DRIFT = Effect(
     laws=(ThermalDrift,),
     scaled=shapes,
     coordinates=("time_by_velocity", "time_by_direction"),
-    confusable_with=("friction_step", "viscous_nonlinearity"),
+    confusable_with=("friction_step", "viscous_nonlinearity", "gain_drift"),
     separate_by="Repeat from cold: warming repeats, a step does not.",
     momentary=True,
     variant=_of_law,
