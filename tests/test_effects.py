@@ -46,7 +46,7 @@ CASES = {
     "position_friction": (T.PositionDependentFriction(0.05), (0.9, 1.1)),
     "sticky_spot": (T.StickySpot(0.01, 0.003), (2.0,)),
     "local_force": (T.LocalForce(0.01, 0.003), (2.0,)),
-    "encoder": (T.EncoderError(0.06), (0.4, 0.5, 3.0, 2.0)),
+    "encoder": (T.EncoderError(0.06, 20.0), (0.4, 0.5)),
     "gain_drift": (T.GainDrift(4.0, start=-1.0), (0.2,)),
     "position_inertia": (T.PositionDependentInertia(0.06), (0.4, 0.5)),
     "load_friction": (T.LoadDependentFriction(), (0.1,)),

@@ -49,7 +49,7 @@ LAWS = {
     "friction": terms.PositionDependentFriction(0.4),
     "spot": terms.StickySpot(0.1, 0.2),
     "local force": terms.LocalForce(0.1, 0.2),
-    "encoder": terms.EncoderError(0.7),
+    "encoder": terms.EncoderError(0.7, 3.0),
     "gain drift": terms.GainDrift(0.6, start=-1.0),
     "varying inertia": terms.PositionDependentInertia(0.7),
     "tone": terms.PeriodicDisturbance(2.0),

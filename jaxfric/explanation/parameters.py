@@ -91,7 +91,7 @@ _wave = programs.compiled(wave)
 
 
 def _waves(term, values, matrix, plain) -> dict[str, Estimate]:
-    """Amplitude and phase of every pair of sine and cosine; of several alike, of the first one."""
+    """Amplitude and phase of every pair of sine and cosine."""
     found = {}
     names = [p.name for p in term.affine]
     for i, name in enumerate(names):
@@ -99,8 +99,6 @@ def _waves(term, values, matrix, plain) -> dict[str, Estimate]:
             continue
         harmonic = name.removesuffix("_sin").partition("_harmonic")[2]
         suffix = f"_harmonic{harmonic}" if harmonic else ""
-        if f"amplitude{suffix}" in found:
-            continue
         pair = _wave(*map(np.asarray, values[i : i + 2]), matrix[i : i + 2, i : i + 2])
         unit, pair = plain[name].unit, Wave(*map(np.asarray, pair))
         freedom = min(plain[n].degrees_of_freedom for n in names[i : i + 2])
