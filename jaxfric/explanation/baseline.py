@@ -10,7 +10,7 @@ from ..models import Model, named, require
 from ..terms import KNOWN_FORCE
 from ..terms.base import AbstractTerm
 from .evidence import Evidence
-from .least_squares import solve
+from .least_squares import orthonormal, solve
 from .predictions import with_predictions
 from .regression import Fit, fit
 
@@ -109,11 +109,12 @@ def as_given(
     fixed = [i for i in range(count) if i not in free]
     for _ in range(2):  # some terms act on what the others predict
         seen = with_predictions(evidence, current)
-        if others and not free:
-            beside = seen._replace(target=given.residual)
-            current = current._replace(
-                betas=(searched, *fit(others, beside, current.betas[1:], iterations).betas)
-            )
+        if others:
+            columns = seen.columns(given.terms[0], searched[None])[0]
+            rest = seen.target - columns[:, fixed] @ given.alphas[0][fixed]
+            beside = orthonormal(np.delete(columns, fixed, axis=1)) if free else None
+            own = fit(others, seen._replace(target=rest), current.betas[1:], iterations, beside)
+            current = current._replace(betas=(searched, *own.betas))
         current = fit(current.terms, seen, (searched, *current.betas[1:]), 0)
         alpha = np.zeros(current.columns.shape[1])
         alpha[fixed] = given.alphas[0][fixed]

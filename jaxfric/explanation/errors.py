@@ -95,7 +95,7 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     carried = verification.carried(selection.last, problem.held, selection.rephased)
     again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
     model = findings.model(findings.with_late(again))
-    known = selection.given is None and _left_by(findings.undelayed, again) > ELSEWHERE * (
+    known = selection.fitted and _left_by(findings.undelayed, again) > ELSEWHERE * (
         verification.error(selection.last, problem.evidence)
     )
     return {

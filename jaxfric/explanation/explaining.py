@@ -32,6 +32,7 @@ from .rivals import NO_EVIDENCE
 from .search import nothing, obeying, searched
 from .slow_curve import at_slow_speeds
 from .summary import facts, summarise, tone_left
+from .undetermined import without_undetermined
 
 
 def explain(
@@ -138,6 +139,7 @@ def _explain(
         problem.close()
         found = _explain(inputs._replace(baseline=small.baseline), simulate, seed, doing)
         return with_idealised(found, small)
+    better = without_undetermined(better, inputs.figures)
     wrong, better, more = _held_out(known, wrong, better, inputs, held, doing)
     remarks += more
     better = at_slow_speeds(known, better, inputs.figures)

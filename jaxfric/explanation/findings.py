@@ -68,7 +68,10 @@ class Findings(NamedTuple):
 
     def at_base(self, base: Fit) -> "Findings":
         """No findings: that fit of the baseline alone."""
-        return alone(Solution(self.problem, self.selection._replace(last=base, selected=[])))
+        selection = self.selection._replace(last=base, selected=[])
+        if selection.undetermined:  # beside findings, and perhaps not without them
+            selection = selection._replace(given=None, free=(), undetermined=())
+        return alone(Solution(self.problem, selection))
 
     def fit_without(self, number: int) -> Fit:
         """The model without one of the findings, the others refitted.

@@ -47,6 +47,8 @@ class Selection(NamedTuple):
     - `in_slip`: what rows in slip had shown, where rows reach across reversals.
     - `given`: the base with its own values, where these stay but for `free`, numbers of its
       parameters.
+    - `undetermined`: numbers of its parameters that are none, since nothing determines them; all
+      others are fitted.
     - `trusted`: whether these values are taken as exact, since a term stands in for wrong ones.
     - `curve`: parameters of the base's friction that are of the samples and not of the rows.
     - `undone`: puts back the force of a recording, where it acts late; `time_error`: of that time,
@@ -61,9 +63,15 @@ class Selection(NamedTuple):
     in_slip: "Selection | None" = None
     given: Model | None = None
     free: tuple[int, ...] = ()
+    undetermined: tuple[int, ...] = ()
     trusted: bool = False
     curve: Mapping[str, Estimate] = MappingProxyType({})
     undone: Callable[[Recording], Motion] | None = None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether the base has values of this recording."""
+        return self.given is None or bool(self.undetermined)
 
     @property
     def names(self) -> frozenset[str]:

@@ -76,7 +76,7 @@ def at_slow_speeds(known: Baseline, better: Improved, figures: Figures) -> Impro
     """
     findings, selection = better.findings, better.findings.selection
     effects = [each.effect for each in selection.selected]
-    given = known.model is not None or known.fit is not None or selection.given is not None
+    given = known.model is not None or known.fit is not None or not selection.fitted
     if given or better.refitted or findings.problem.reversals:
         return better
     places = _friction(selection.last)
@@ -184,7 +184,7 @@ def _with_friction(last: Fit, places: _Places, found: Fit, findings: Findings) -
 def _instead(better: Improved, last: Fit, values: dict[str, Estimate]) -> Improved:
     """With another fit of the same terms, whose friction has these values."""
     problem, selection = better.findings.recorded
-    selection = selection._replace(last=last, curve=values)
+    selection = selection._replace(last=last, curve=values, given=None, free=(), undetermined=())
     if selection.selected:
         return better._replace(findings=alone(Solution(problem, selection)))
     findings = alone(Solution(problem, selection._replace(base=last)))

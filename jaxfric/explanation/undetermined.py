@@ -1,0 +1,87 @@
+"""What a recording does not determine of the baseline that is fitted to it.
+
+Where an axis turns within a kernel the rows begin above the speeds of a narrow Stribeck bump, and
+any height of it fits them. Another recording that is slow for longer has then a friction that
+nobody measured: what is not needed is none.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..identification.uncertainty import Estimate
+from ..models import Model
+from ..terms.base import changed_columns
+from . import parameters as spelled
+from .acceptance import LINEARITY, OF_BASE
+from .baseline import as_given
+from .evidence import Evidence
+from .figures import Figures
+from .findings import Findings, Solution
+from .holdout import measured
+from .improvement import Improved
+from .regression import Fit
+from .uncertainty import by_rows
+
+
+def without_undetermined(better: Improved, figures: Figures) -> Improved:
+    """With none of the base's laws whose size may be none and which nothing needs: neither the
+    rows, beyond the price of its numbers (Schwarz 1978) and beyond a tenth in amplitude of what the
+    findings take, whose laws have not quite the shapes of their forces, nor the samples, by what a
+    sensor resolves. The fit of the baseline alone is without those that nothing there determines.
+    """
+    findings, first = better.findings, better.first
+    if findings.selection.given is not None or better.refitted:
+        return better
+    problem, last = findings.problem, findings.undelayed.selection.last
+    size = max(findings.selection.remaining.size, 2)
+    known = list(by_rows(findings)[0].here.values())
+    alone = spelled.estimates(first, problem.block, problem.evidence.motion.unit_names)[0]
+    nil = [[_may_be_none(each) for each in values] for values in (known, list(alone.values()))]
+    gone: tuple[int, ...] = ()
+    for shape, own in enumerate(changed_columns(last.terms[0])):
+        law = (*own, len(last.alphas[0]) + shape)
+        price = np.expm1(len(law) * np.log(size) / size)
+        if all(nil[0][i] for i in own):
+            less = _without(better, law)
+            ours, theirs = (b.findings.undelayed.selection.last.energy for b in (better, less))
+            if theirs - ours < max(price * ours, OF_BASE * (first.energy - ours)):
+                less = measured(less, figures)
+                if less.after.here**2 - better.after.here**2 < LINEARITY**2:
+                    better = less
+        if all(nil[1][i] for i in own):
+            simpler, _, _ = _fixed(better.first, problem.evidence, (*gone, *law))
+            if simpler.energy < (1 + price) * better.first.energy:
+                better, gone = better._replace(first=simpler), (*gone, *law)
+    return measured(better, figures)
+
+
+def _may_be_none(estimate: Estimate) -> bool:
+    low, high = spelled.tested(estimate).interval()
+    return bool(low <= 0 <= high)
+
+
+def _without(better: Improved, law: tuple[int, ...]) -> Improved:
+    """With none of a law of the base, by the numbers of its parameters."""
+    gone = (*better.findings.selection.undetermined, *law)
+
+    def of(solution: Solution) -> Solution:
+        problem, selection = solution
+        base, _, _ = _fixed(selection.base, problem.evidence, gone)
+        last, model, free = _fixed(selection.last, problem.evidence, gone)
+        selection = selection._replace(base=base, last=last, given=model, free=free)
+        return Solution(problem, selection._replace(undetermined=gone))
+
+    return better._replace(findings=Findings(*map(of, better.findings)))
+
+
+def _fixed(
+    current: Fit, evidence: Evidence, gone: tuple[int, ...]
+) -> tuple[Fit, Model, tuple[int, ...]]:
+    """A fit whose base has no force of the affine parameters of those numbers; the base so, and the
+    numbers of its other parameters.
+    """
+    size = len(current.alphas[0])
+    alpha = np.where(np.isin(np.arange(size), gone), 0.0, current.alphas[0])
+    free = tuple(i for i in range(size + len(current.betas[0])) if i not in gone)
+    model = Model(spelled.whole(current.only([0])), jnp.asarray(alpha), evidence.motion.units)
+    return as_given(model, current, evidence, free), model, free
