@@ -24,35 +24,39 @@ from .uncertainty import by_rows
 
 
 def without_undetermined(better: Improved, figures: Figures) -> Improved:
-    """With none of the base's laws whose size may be none and which nothing needs: neither the
-    rows, beyond the price of its numbers (Schwarz 1978) and beyond a tenth in amplitude of what the
-    findings take, whose laws have not quite the shapes of their forces, nor the samples, by what a
-    sensor resolves. The fit of the baseline alone is without those that nothing there determines.
+    """With none of the base's laws whose size may be none and which nothing needs.
+
+    The rows do not, within the price of its numbers (Schwarz 1978), nor the samples, within what a
+    sensor resolves; and neither within a tenth in amplitude of what the findings take there, whose
+    laws have not quite the shapes of their forces. The fit of the baseline alone is without those
+    that nothing there determines.
     """
     findings, first = better.findings, better.first
     if findings.selection.given is not None or better.refitted:
         return better
     problem, last = findings.problem, findings.undelayed.selection.last
     size = max(findings.selection.remaining.size, 2)
-    known = list(by_rows(findings)[0].here.values())
+    beside = list(by_rows(findings)[0].here.values())
     alone = spelled.estimates(first, problem.block, problem.evidence.motion.unit_names)[0]
-    nil = [[_may_be_none(each) for each in values] for values in (known, list(alone.values()))]
-    gone: tuple[int, ...] = ()
+    gone, less, left = tuple[int, ...](), better, last.energy
     for shape, own in enumerate(changed_columns(last.terms[0])):
         law = (*own, len(last.alphas[0]) + shape)
         price = np.expm1(len(law) * np.log(size) / size)
-        if all(nil[0][i] for i in own):
-            less = _without(better, law)
-            ours, theirs = (b.findings.undelayed.selection.last.energy for b in (better, less))
-            if theirs - ours < max(price * ours, OF_BASE * (first.energy - ours)):
-                less = measured(less, figures)
-                if less.after.here**2 - better.after.here**2 < LINEARITY**2:
-                    better = less
-        if all(nil[1][i] for i in own):
-            simpler, _, _ = _fixed(better.first, problem.evidence, (*gone, *law))
-            if simpler.energy < (1 + price) * better.first.energy:
-                better, gone = better._replace(first=simpler), (*gone, *law)
-    return measured(better, figures)
+        if all(_may_be_none(beside[i]) for i in own):
+            simpler = _without(less, law)
+            energy = simpler.findings.undelayed.selection.last.energy
+            if energy - left < max(price * left, OF_BASE * (better.first.energy - left)):
+                less, left = simpler, energy
+        if all(_may_be_none(list(alone.values())[i]) for i in own):
+            simplest, _, _ = _fixed(first, problem.evidence, (*gone, *law))
+            if simplest.energy < (1 + price) * first.energy:
+                first, gone = simplest, (*gone, *law)
+    if less is better and not gone:
+        return better
+    less = measured(less._replace(first=first), figures)
+    taken = better.before.here**2 - better.after.here**2
+    as_well = less.after.here**2 - better.after.here**2 < max(LINEARITY**2, OF_BASE * taken)
+    return less if as_well else better
 
 
 def _may_be_none(estimate: Estimate) -> bool:
@@ -71,7 +75,10 @@ def _without(better: Improved, law: tuple[int, ...]) -> Improved:
         selection = selection._replace(base=base, last=last, given=model, free=free)
         return Solution(problem, selection._replace(undetermined=gone))
 
-    return better._replace(findings=Findings(*map(of, better.findings)))
+    recorded, undelayed = better.findings
+    found = of(recorded)
+    same = undelayed is recorded
+    return better._replace(findings=Findings(found, found if same else of(undelayed)))
 
 
 def _fixed(
