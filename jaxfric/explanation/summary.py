@@ -64,8 +64,11 @@ def summarise(
     errors = document(better, filtered, models[1], figures, tone)
     apart = _elsewhere(errors)
     remarks = [*remarks, *apart]
-    tones = [] if tone is None else [tone]
-    remarks += [beyond.remark(each, figures.samples(models[1])) for each in tones]
+    tones = []
+    if tone is not None:
+        samples = figures.samples(models[1])
+        remarks.append(beyond.remark(tone, samples))
+        tones = [tone] if beyond.matters(tone, samples) else []
     new, later = (
         [s for s in some if s.coordinate not in known.structured] + tones
         for some in (before.counts, after)
