@@ -1921,15 +1921,15 @@ def test_what_halves_the_residual_is_no_chance_though_another_recording_refutes_
 
 
 def test_what_a_law_halves_is_no_noise_though_it_was_not_accepted():
-    def contest(energy, p_value):
-        return types.SimpleNamespace(
-            finalists=[types.SimpleNamespace(energy=energy, p_value=p_value)]
-        )
+    def contest(energy, p_value, beside=1.0):
+        finalist = types.SimpleNamespace(energy=energy, p_value=p_value)
+        return types.SimpleNamespace(finalists=[finalist], energy=beside)
 
-    last = types.SimpleNamespace(energy=1.0)
-    assert verdict.halvable(contest(0.4, 0.002), last)
-    assert not verdict.halvable(contest(0.6, 0.002), last)
-    assert not verdict.halvable(contest(0.4, 0.3), last)
+    assert verdict.halvable(contest(0.4, 0.002))
+    assert not verdict.halvable(contest(0.6, 0.002))
+    assert not verdict.halvable(contest(0.4, 0.3))
+    # Beside a term that was refuted later, which has removed half by itself.
+    assert not verdict.halvable(contest(0.4, 0.002, 0.5))
 
 
 @pytest.mark.parametrize(
