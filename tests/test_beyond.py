@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.explanation.beyond import Samples, half_width, tone_beyond, without
+from jaxfric.explanation.beyond import Samples, half_width, matters, tone_beyond, without
 from jaxfric.explanation.evidence import gather
 
 
@@ -52,6 +52,29 @@ def test_a_tone_too_fast_for_any_row_is_said_to_be_left_and_is_no_noise():
     assert any("300 Hz" in place["detail"] for place in told.where)
     assert "fast_tone" in [warning["name"] for warning in told.warnings]
     assert told.fit["noise_floor"] < 0.5 * told.fit["force_error"]["after"]
+
+
+@pytest.mark.slow
+def test_a_small_tone_is_a_remark_and_no_verdict():
+    """0.3 % of the force, a sixth of the power of what is left: nothing that any effect lacks."""
+    told = jf.explain(axis(300.0, 0.13), "coulomb-viscous", axis(300.0, 0.13, 2))
+    assert told.verdict == "consistent" and not told.findings and not told.where
+    assert "fast_tone" in [warning["name"] for warning in told.warnings]
+
+
+@pytest.mark.parametrize(
+    ("tone", "noise", "verdict"),
+    # Of a force of some 30 N: below a tenth and most of the noise or not, and a tenth of the force.
+    [(0.3, 1.0, False), (1.0, 1.0, False), (2.0, 1.0, True), (3.0, 10.0, False), (6.0, 10.0, True)],
+)
+def test_a_verdict_hangs_on_tones_above_the_noise_or_a_tenth_of_the_force(tone, noise, verdict):
+    recording = axis(90.0, 0.0)
+    time, rng = np.asarray(recording.time), np.random.default_rng(3)
+    rest = tone * np.sin(2 * np.pi * 90 * time) + noise * rng.normal(size=len(time))
+    with jax.enable_x64(True):
+        evidence = gather(recording)
+    left = samples(recording, rest)
+    assert matters(tone_beyond(left, evidence), left) == verdict
 
 
 def samples(recording, rest):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from jaxfric import PD, Encoder, Recording, models, simulate, terms
+from jaxfric import PD, Encoder, Recording, models, signals, simulate, terms
 from jaxfric.checks import Remark
 from jaxfric.explanation import (
     acceptance,
@@ -63,6 +63,7 @@ from jaxfric.simulation.actuator import parted
 from jaxfric.simulation.errors import force_error
 from jaxfric.simulators import Known
 from jaxfric.terms.base import summands
+from jaxfric.terms.effect import Residual
 from jaxfric.terms.effects import EFFECTS, disturbance_pulses
 from jaxfric.terms.sample import Scales
 
@@ -997,6 +998,40 @@ def test_a_push_is_alone_and_seen_from_begin_to_end():
     assert found((0.02, 1), (12.0, -1), (19.98, 1)) == pytest.approx([12.0], abs=0.01)
 
 
+def counted(count: float | None, push: float = 0.0) -> Residual:
+    """Rows of a loop's answer to counts of 0.4 mrad, logged at 200 Hz, of an axis that slows down
+    from 0.33 to 0.3 rad/s; the third push of some is real, N.
+    """
+    time = np.arange(0.0, 30.0, 0.005)
+    speed = 0.3 + 0.03 * np.exp(-np.mod(time, 6.0) / 0.5)  # 0.32: four counts a sample
+    position = np.cumsum(speed) * 0.005
+    turns = 2 * np.pi * position / 0.0004
+    force = 0.5 * (np.cos(turns) + np.cos(2 * turns)) + 0.05 * np.random.default_rng(0).normal(
+        size=len(time)
+    )
+    force += push * np.cos(np.clip((time - 15.0) / 0.1, -1, 1) * np.pi / 2) ** 2
+    weight = signals.kernel(np.arange(-18, 19) / 18)
+    rows = np.convolve(force, weight / weight.sum(), "same")[18:-18:9]
+    nodes, centre = time[18:-18:3], time[18:-18:9]
+    return Residual(
+        values=rows, time=centre, elapsed=centre, reach=0.09, clock=nodes, run=nodes,
+        turns=np.zeros(0), level=0.01, interval=0.005,
+        counts=None if count is None else speed[18:-18:9] * 0.005 / count,
+        noise=signals.host_white_noise(force, np.ones(len(time) - 1, bool)),
+    )  # fmt: skip
+
+
+def test_counts_in_step_with_the_samples_are_no_pushes():
+    """Where a whole number of counts pass from sample to sample the answers do not average out."""
+    beating = max((len(t.times) for t in disturbance_pulses.pulses(counted(None))), default=0)
+    assert beating >= 3
+    assert list(disturbance_pulses.pulses(counted(0.0004))) == []
+    # Another encoder's counts are not in step there, and no count makes so high a push.
+    assert max(len(t.times) for t in disturbance_pulses.pulses(counted(0.00037))) >= 3
+    for term in disturbance_pulses.pulses(counted(0.0004, 5.0)):
+        assert term.times == pytest.approx([15.0], abs=0.03)
+
+
 def test_a_knock_stands_out_of_many_things_that_are_no_pushes():
     time = 0.01 * np.arange(4000)
     values = np.random.default_rng(0).normal(size=time.size)
@@ -1886,15 +1921,15 @@ def test_what_halves_the_residual_is_no_chance_though_another_recording_refutes_
 
 
 def test_what_a_law_halves_is_no_noise_though_it_was_not_accepted():
-    def contest(energy, p_value):
-        return types.SimpleNamespace(
-            finalists=[types.SimpleNamespace(energy=energy, p_value=p_value)]
-        )
+    def contest(energy, p_value, beside=1.0):
+        finalist = types.SimpleNamespace(energy=energy, p_value=p_value)
+        return types.SimpleNamespace(finalists=[finalist], energy=beside)
 
-    last = types.SimpleNamespace(energy=1.0)
-    assert verdict.halvable(contest(0.4, 0.002), last)
-    assert not verdict.halvable(contest(0.6, 0.002), last)
-    assert not verdict.halvable(contest(0.4, 0.3), last)
+    assert verdict.halvable(contest(0.4, 0.002))
+    assert not verdict.halvable(contest(0.6, 0.002))
+    assert not verdict.halvable(contest(0.4, 0.3))
+    # Beside a term that was refuted later, which has removed half by itself.
+    assert not verdict.halvable(contest(0.4, 0.002, 0.5))
 
 
 @pytest.mark.parametrize(

@@ -547,11 +547,11 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         def without(self, number):
             return Dated(self.names[:number] + self.names[number + 1 :], self.wrong)
 
-    errors = {"a": 1.0, "b": 0.6, "c": 0.1}
+    errors = {"a": 1.0, "b": 0.4, "c": 0.1}
 
     def estimated(some):
         return [
-            {"viscous": Estimate(np.float64(1.0), np.float64(errors[name]), "")}
+            {"viscous": Estimate(np.float64(1.0), np.float64(errors[name]), "", 3.0)}
             for name in some.names
         ]
 
@@ -567,8 +567,8 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         assert improvement.without_unsure(Dated("abc", "")).names == left
 
 
-def test_the_change_of_a_simulators_value_is_tested_by_the_interval_that_is_told():
-    """Of one that acts in few blocks that is wider: 1.00 ± 1.05 with three degrees of freedom."""
+def test_what_happens_once_is_tested_by_the_interval_that_is_told():
+    """Of what acts in few blocks that is wider: 1.00 ± 1.05 with three degrees of freedom."""
     few = {"viscous": Estimate(np.float64(1.0), np.float64(0.33), "", 3.0)}
     assert not may_be_none(terms.Viscous(), few)
     assert may_be_none(terms.Viscous(), few, as_told=True)

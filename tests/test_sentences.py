@@ -1,11 +1,12 @@
 """What is said of findings, as an engineer says it."""
 
 import math
+import types
 
 import numpy as np
 import pytest
 
-from jaxfric.explanation import reported, summary
+from jaxfric.explanation import errors, reported, summary
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
 from jaxfric.explanation.sentences import mismatch_sentence, sentence
@@ -239,6 +240,30 @@ def test_a_held_out_recording_that_holds_more_is_told(here, held, refitted, name
         "filtered_holdout_refitted_error": refitted,
     }
     assert [remark.name for remark in summary._elsewhere(fit)] == ([name] if name else [])
+
+
+@pytest.mark.parametrize(("size", "about"), [(9.0, 30.25), (1.0, None)])
+def test_what_a_held_out_recording_holds_at_one_moment_is_told_with_that(monkeypatch, size, about):
+    """It may be a motion that is too quick for the kernel, which no row can tell from a force."""
+    rows = np.arange(480)
+    left = types.SimpleNamespace(residual=np.where(rows // 20 == 6, size, 1.0) + (rows == 121))
+    held = types.SimpleNamespace(
+        elapsed=0.25 * rows, centre=rows, reach=0.5, motion=types.SimpleNamespace(time=0.25 * rows)
+    )
+    problem = types.SimpleNamespace(held=held, evidence=held)
+    findings = types.SimpleNamespace(
+        undelayed=types.SimpleNamespace(problem=problem), problem=problem
+    )
+    monkeypatch.setattr(errors, "_fitted_there", lambda solution: left)
+    assert errors.brief(findings) == about
+    fit = {
+        "filtered_force_error": {"after": 0.001},
+        "filtered_holdout_force_error": {"after": 0.052},
+        "filtered_holdout_refitted_error": 0.049,
+    }
+    (remark,) = summary._elsewhere(fit, findings)
+    assert ("most of that about t = 30.25 s" in remark.text) == bool(about)
+    assert ("a filter of 0.5 s" in remark.text) == bool(about) and "acts there" in remark.text
 
 
 @pytest.mark.parametrize(

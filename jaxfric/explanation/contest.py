@@ -86,13 +86,15 @@ class Contest(NamedTuple):
     """One round: every candidate on the grid, and the finalists refitted with the whole model.
 
     `size`: how many independent values the residual is worth; `unseen`: effects of which the model
-    imitates a law as a whole, so that this motion does not show it.
+    imitates a law as a whole, so that this motion does not show it; `energy`: what the model leaves
+    that they compete beside, N².
     """
 
     trials: list[Trial]
     finalists: list[Finalist]
     size: float
     unseen: frozenset[str] = frozenset()
+    energy: float = 0.0
 
 
 def contest(
@@ -138,7 +140,7 @@ def contest(
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
     finalists = _finals(seen, current, field, eligible, size, within_reach, refused)
-    return Contest(trials, finalists, size, unseen)
+    return Contest(trials, finalists, size, unseen, current.energy)
 
 
 def _trial(candidate: Candidate, scan: Scan, p_value: float, limit: float) -> Trial:

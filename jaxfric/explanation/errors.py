@@ -92,8 +92,7 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
     problem, selection = findings.undelayed
     if problem.held is None:
         return dict.fromkeys(("error", "filtered", "values"))
-    carried = verification.carried(selection.last, problem.held, selection.rephased)
-    again = fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
+    again = _fitted_there(findings.undelayed)
     model = findings.model(findings.with_late(again))
     known = selection.fitted and _left_by(findings.undelayed, again) > ELSEWHERE * (
         verification.error(selection.last, problem.evidence)
@@ -103,6 +102,26 @@ def _refitted(findings: Findings, figures: Figures) -> dict[str, Any]:
         "filtered": verification.error(again, problem.held),
         "values": _differing(findings.undelayed, again) if known else {},
     }
+
+
+def _fitted_there(solution: Solution) -> Fit:
+    """The model fitted to the held-out recording."""
+    problem, selection = solution
+    carried = verification.carried(selection.last, problem.held, selection.rephased)
+    return fit(carried.terms, with_predictions(problem.held, carried), carried.betas)
+
+
+def brief(findings: Findings) -> float | None:
+    """About when most of what the model leaves of the held-out recording, fitted to it, is left.
+
+    In s; `None` where no one of its blocks holds more than half of it.
+    """
+    solution = findings.undelayed
+    held, left = solution.problem.held, _fitted_there(solution).residual ** 2
+    by_block = np.bincount(blocks(held.elapsed[held.centre], held.reach), left)
+    if by_block.max() <= 0.5 * left.sum():
+        return None
+    return float(np.asarray(held.motion.time)[held.centre[np.argmax(left)]])
 
 
 def _left_by(solution: Solution, again: Fit) -> float:

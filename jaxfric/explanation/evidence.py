@@ -41,6 +41,8 @@ class Evidence(NamedTuple):
     - `pieces`: numbers of the stretches in which the force is compared throughout, `(M,)`.
     - `clock`: whether the time stamps increase throughout, so that time is a coordinate.
     - `located`: whether a position was recorded; else there is none, or the velocity's integral.
+    - `counted`: the step of the recorded position, m; zero where it is not counted.
+    - `noise`: standard deviation of the white noise of the force's samples, N.
     """
 
     motion: Recording
@@ -59,6 +61,8 @@ class Evidence(NamedTuple):
     width: int
     clock: bool
     located: bool
+    counted: float
+    noise: float
 
     @property
     def half(self) -> int:
@@ -230,6 +234,9 @@ def gather(
     target = _without_simulated(force, parts, index, rows, average, averaged(slope))
     pads = nodes.num_samples - len(parts["time"])
     time = np.asarray(prepared.time)[np.asarray(prepared.mask)]
+    located = prepared.position is not None and motion.recording.position_every > 0
+    first = np.asarray(prepared.force, float)[:MOST]
+    linked = signals.host_continuous(prepared, limits.interval)[: len(first) - 1]
     return Evidence(
         motion=nodes,
         nodes=len(parts["time"]),
@@ -246,7 +253,9 @@ def gather(
         reach=span,
         width=step * half,
         clock=bool(np.all(np.diff(time) > 0)),
-        located=prepared.position is not None and motion.recording.position_every > 0,
+        located=located,
+        counted=signals.count_of(np.asarray(prepared.position, float)[:MOST]) if located else 0.0,
+        noise=signals.host_white_noise(first, linked),
     )
 
 

@@ -150,13 +150,13 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
     return tuple(dict.fromkeys(n for n in names if names.count(n) > others.count(n)))
 
 
-def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
+def without_unsure(findings: Findings) -> Findings:
     """Without changes at a moment whose size may as well be none once the moment is uncertain, or
     that may have been at any moment, and without pushes all of which may be none.
 
     What a change is told by is the value before and after: an interval that holds both says
-    nothing. Pushes are told by their sizes alone, and tested by the intervals that are told, which
-    are wider where one acts in few blocks. `as_told`: so are changes, as of a simulator's value.
+    nothing. No other recording can bear out what happens once, so that it is tested by the
+    intervals that are told, which are wider where one acts in few blocks.
     """
     while True:
         selected = findings.selection.selected
@@ -165,11 +165,10 @@ def without_unsure(findings: Findings, as_told: bool = False) -> Findings:
             return findings
         values = estimated(findings)[findings.selection.term_index(0) :]
         terms = findings.selection.last.terms[findings.selection.term_index(0) :]
-        told = [each.effect.isolated or as_told and bool(each.effect.moment) for each in selected]
         unsure = [
             n
             for n in dated
-            if spelled.may_be_none(terms[n], values[n], as_told=told[n]) or anytime(findings, n)
+            if spelled.may_be_none(terms[n], values[n], as_told=True) or anytime(findings, n)
         ]
         if not unsure:
             return findings

@@ -24,6 +24,8 @@ def outstanding(evidence: Evidence, current: Fit) -> list[Candidate]:
 def _residual(evidence: Evidence, current: Fit) -> Residual:
     clock = np.asarray(evidence.motion.time)
     run, velocity = evidence.elapsed[: evidence.nodes], np.asarray(evidence.motion.velocity)
+    interval = float(evidence.limits.interval)
+    passed = velocity * interval / (evidence.counted or np.nan)
     return Residual(
         values=current.residual,
         time=clock[evidence.centre],
@@ -33,6 +35,9 @@ def _residual(evidence: Evidence, current: Fit) -> Residual:
         run=run,
         turns=run[1:][np.diff(np.sign(velocity[: evidence.nodes])) != 0],
         level=LEVEL,
+        interval=interval,
+        counts=evidence.project(passed) if evidence.counted else None,
+        noise=evidence.noise,
     )
 
 

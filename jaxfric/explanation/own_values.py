@@ -104,4 +104,4 @@ def improved_model(
     if inputs.recording.num_samples > MOST:  # whose predictions need the memory
         for problem in (findings.problem, findings.undelayed.problem):
             problem.forget()
-    return improved(first, without_unsure(findings, bool(inputs.attributes)), inputs.figures)
+    return improved(first, without_unsure(findings), inputs.figures)

@@ -14,7 +14,7 @@ from .acceptance import LINEARITY, OF_BASE
 from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, creeping, doubts, not_better
-from .errors import document, filtered_errors
+from .errors import brief, document, filtered_errors
 from .explained import Explanation
 from .figures import Figures
 from .finding import Finding
@@ -62,10 +62,13 @@ def summarise(
         remarks = [*remarks, *_doubts(better)]
     tone = tone_left(better.findings, figures)
     errors = document(better, filtered, models[1], figures, tone)
-    apart = _elsewhere(errors)
+    apart = _elsewhere(errors, better.findings)
     remarks = [*remarks, *apart]
-    tones = [] if tone is None else [tone]
-    remarks += [beyond.remark(each, figures.samples(models[1])) for each in tones]
+    tones = []
+    if tone is not None:
+        samples = figures.samples(models[1])
+        remarks.append(beyond.remark(tone, samples))
+        tones = [tone] if beyond.matters(tone, samples) else []
     new, later = (
         [s for s in some if s.coordinate not in known.structured] + tones
         for some in (before.counts, after)
@@ -132,7 +135,7 @@ def _values_differ(
 def _halvable(selection: Selection, filtered: Mapping[str, Any]) -> bool:
     """Whether a law that was not accepted halves what is left, of more than a sensor resolves."""
     left = filtered["force_error"]["after"]
-    return left > LINEARITY and halvable(selection.remaining, selection.last)
+    return left > LINEARITY and halvable(selection.remaining)
 
 
 def _drawn(
@@ -182,11 +185,12 @@ def _doubts(better: Improved) -> list[Remark]:
     return remarks
 
 
-def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
+def _elsewhere(errors: Mapping[str, Any], findings: Findings | None = None) -> list[Remark]:
     """That the held-out recording obeys other values of the same model, or holds something that no
     values account for and that is not here, where that matters.
 
-    Less is told in the summary alone.
+    Less is told in the summary alone. What is left at one moment may be of a motion that is too
+    quick there for the kernel: with the `findings` that is said.
     """
     here, held = errors["filtered_force_error"], errors["filtered_holdout_force_error"]
     refitted = errors["filtered_holdout_refitted_error"]
@@ -198,9 +202,17 @@ def _elsewhere(errors: Mapping[str, Any]) -> list[Remark]:
             return []
         text = (
             f"The held-out recording is left with {held['after']:.1%} of its force, whatever the "
-            f"values, and this one with {here['after']:.1%}: something acts there that does not "
-            "act here, or not as much. Explain that one, with this one held out."
+            f"values, and this one with {here['after']:.1%}: "
         )
+        acts = "something acts there that does not act here, or not as much"
+        about = None if findings is None else brief(findings)
+        if about is not None:
+            reach = findings.problem.evidence.reach
+            text += f"most of that about t = {about:.4g} s. Either {acts}, or the motion is too "
+            text += f"quick there for a filter of {reach:.2g} s, as this log needs"
+        else:
+            text += acts
+        text += ". Explain that one, with this one held out."
         return [Remark(HOLDS_MORE, text, False)]
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "

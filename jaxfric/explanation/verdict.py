@@ -10,7 +10,6 @@ from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY, OF_BASE
 from .contest import Contest
 from .finding import Finding
-from .regression import Fit
 from .significance import LEVEL
 from .wording import LARGE
 
@@ -76,13 +75,14 @@ def halved(refuted: Sequence[Finding]) -> bool:
     return any(finding.share > 1 - HALF**2 for finding in refuted)
 
 
-def halvable(remaining: Contest, last: Fit) -> bool:
+def halvable(remaining: Contest) -> bool:
     """Whether a law that was not accepted removes half of what is left, beyond chance.
 
     Noise cannot be halved, that of the encoder by the controller's answer neither: then something
-    is missing, though that law is not its name.
+    is missing, though that law is not its name. Half of what the model leaves that it competed
+    beside: what the held-out recording refuted later has removed its part there.
     """
-    left = last.energy * (1 - HALF)
+    left = remaining.energy * (1 - HALF)
     return any(f.p_value <= LEVEL and f.energy < left for f in remaining.finalists)
 
 

@@ -45,6 +45,7 @@ from .noise import (
     SLIP_DEVIATIONS as SLIP_DEVIATIONS,
     count_of as count_of,
     counted_noise as counted_noise,
+    host_white_noise as host_white_noise,
     white_noise as white_noise,
 )
 from .parabolas import (

@@ -60,9 +60,11 @@ SIDE = "side"
 class Residual(NamedTuple):
     """What a fit leaves of a recording, row by row.
 
-    `values`, N; `time`, s, and `elapsed`, s, without interruptions, each `(J,)`; `reach` of a row
-    to either side, s, twice their spacing; `clock` and `run`: time and elapsed time at the nodes;
-    `turns`: elapsed times at which the axis reverses, s; `level` of significance.
+    `values`, N; `time`, s, and `elapsed`, s, without interruptions; `counts` of the encoder that
+    pass from sample to sample, `None` where the position is not counted; `(J,)` each; `reach` of a
+    row to either side, s, twice their spacing; `clock` and `run`: time and elapsed time at the
+    nodes; `turns`: elapsed times at which the axis reverses, s; `level` of significance; `interval`
+    from sample to sample, s; `noise` of the force's samples, N.
     """
 
     values: np.ndarray
@@ -73,6 +75,9 @@ class Residual(NamedTuple):
     run: np.ndarray
     turns: np.ndarray
     level: float
+    interval: float = 0.0
+    counts: np.ndarray | None = None
+    noise: float = 0.0
 
 
 class Extent(NamedTuple):

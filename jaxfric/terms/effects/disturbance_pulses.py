@@ -56,6 +56,10 @@ OUTSTANDING = 5.0
 # More pushes than this, or more of the time than that, are no isolated ones; but those are that
 # are four times as high as the first one too many: one of the many would not reach so far.
 MOST, LARGEST_PART, APART_FROM_MANY = 12, 0.2, 4.0
+# Noise reaches three times its size, the answers to counts of an encoder too.
+REACHED = 3.0
+# Harmonics of the counts that are looked at: by the second, counts that pass one in two samples.
+HARMONICS = (1, 2)
 # A push is isolated if there is none of the other sign within its own breadth on either side, two
 # widths and as much of the kernel: what pushes and at once pulls is how a shock ends, or counts of
 # the encoder that come and go in the controller's velocity.
@@ -72,10 +76,31 @@ def pulses(left: Residual) -> Iterator[AbstractTerm]:
     widths = spacing * np.geomspace(2.0, max(4.0, 0.02 * len(time)), 14)
     for width in widths:
         places = _outstanding(left.values, time, width, spacing)
-        if not places or 2 * width * len(places) > LARGEST_PART * (time[-1] - time[0]):
+        if 2 * width * len(places) > LARGEST_PART * (time[-1] - time[0]):
             continue
-        if not _at_reversals(left, places, width):
+        places = [place for place in places if not _beats(left, place, width)]
+        if places and not _at_reversals(left, places, width):
             yield DisturbancePulses(tuple(places), float(width))
+
+
+def _beats(left: Residual, place: float, width: float) -> bool:
+    """Whether a push is no higher than what counts of the encoder make where they keep step with
+    the samples.
+
+    A controller answers each count, and at most speeds the samples of its answers are noise. Where
+    a whole or a half number of counts pass from sample to sample, all samples see the same part of
+    the answer: it does not average out any more, and while the speed passes by, that is a push. A
+    count's answer is no more than noise of the samples reaches, times the part that is in step.
+    """
+    if left.counts is None:
+        return False
+    shape = np.cos(0.5 * np.pi * (left.time - place).clip(-width, width) / width) ** 2
+    height = abs(shape @ left.values) / (shape @ shape)
+    samples = np.arange(place - width, place + width, left.interval)
+    weight = np.cos(0.5 * np.pi * (samples - place) / width) ** 2
+    turns = 2 * np.pi * np.cumsum(np.interp(samples, left.time, left.counts))
+    step = max(abs(weight @ np.exp(1j * n * turns)) for n in HARMONICS)
+    return bool(height <= REACHED * left.noise * step / (weight @ weight))
 
 
 def _at_reversals(left: Residual, places: list[float], width: float) -> bool:
