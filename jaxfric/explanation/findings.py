@@ -27,7 +27,9 @@ class Solution(NamedTuple):
     def without(self, number: int) -> "Solution":
         """Without the selected term of that number, the others refitted."""
         selected = _but(self.selection.selected, number)
-        last = self.fit_without(number) if selected else self.selection.base
+        if not selected:
+            return self._replace(selection=self.selection.at_base(self.selection.base))
+        last = self.fit_without(number)
         return self._replace(selection=self.selection._replace(last=last, selected=selected))
 
 
@@ -68,10 +70,7 @@ class Findings(NamedTuple):
 
     def at_base(self, base: Fit) -> "Findings":
         """No findings: that fit of the baseline alone."""
-        selection = self.selection._replace(last=base, selected=[])
-        if selection.undetermined:  # beside findings, and perhaps not without them
-            selection = selection._replace(given=None, free=(), undetermined=())
-        return alone(Solution(self.problem, selection))
+        return alone(Solution(self.problem, self.selection.at_base(base)))
 
     def fit_without(self, number: int) -> Fit:
         """The model without one of the findings, the others refitted.

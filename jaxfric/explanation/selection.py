@@ -83,6 +83,13 @@ class Selection(NamedTuple):
         """The forms of the laws that were found."""
         return frozenset(each.form for each in self.selected)
 
+    def at_base(self, base: Fit) -> "Selection":
+        """Nothing selected: that fit of the base alone, which may hold what nothing determines of
+        it beside findings.
+        """
+        alone = self._replace(last=base, selected=[])
+        return alone._replace(given=None, free=(), undetermined=()) if self.undetermined else alone
+
     def term_index(self, number: int) -> int:
         """The index, among all terms of the fit, of the selected term of that number."""
         return len(self.last.terms) - len(self.selected) + number

@@ -53,7 +53,8 @@ def without_undetermined(better: Improved, figures: Figures) -> Improved:
                 first, gone = simplest, (*gone, *law)
     if less is better and not gone:
         return better
-    less = measured(less._replace(first=first), figures)
+    found = Findings(*(_with_base(each, gone) for each in less.findings))
+    less = measured(less._replace(first=first, findings=found), figures)
     taken = better.before.here**2 - better.after.here**2
     as_well = less.after.here**2 - better.after.here**2 < max(LINEARITY**2, OF_BASE * taken)
     return less if as_well else better
@@ -70,15 +71,23 @@ def _without(better: Improved, law: tuple[int, ...]) -> Improved:
 
     def of(solution: Solution) -> Solution:
         problem, selection = solution
-        base, _, _ = _fixed(selection.base, problem.evidence, gone)
         last, model, free = _fixed(selection.last, problem.evidence, gone)
-        selection = selection._replace(base=base, last=last, given=model, free=free)
-        return Solution(problem, selection._replace(undetermined=gone))
+        selection = selection._replace(last=last, given=model, free=free, undetermined=gone)
+        return Solution(problem, selection)
 
     recorded, undelayed = better.findings
     found = of(recorded)
     same = undelayed is recorded
     return better._replace(findings=Findings(found, found if same else of(undelayed)))
+
+
+def _with_base(solution: Solution, gone: tuple[int, ...]) -> Solution:
+    """With a fit of the base alone that has no force of the affine parameters of those numbers."""
+    problem, selection = solution
+    if not gone:
+        return solution
+    base, _, _ = _fixed(selection.base, problem.evidence, gone)
+    return Solution(problem, selection._replace(base=base))
 
 
 def _fixed(
