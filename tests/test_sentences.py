@@ -8,7 +8,7 @@ import pytest
 from jaxfric.explanation import reported, summary
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
-from jaxfric.explanation.sentences import mismatch_sentence, sentence
+from jaxfric.explanation.sentences import factor_sentence, mismatch_sentence, sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effect import Extent
 from jaxfric.terms.effects import EFFECTS
@@ -149,17 +149,20 @@ def moved(value, error, before):
     return Moved(before, estimate(value, error, "N"))
 
 
-def test_values_that_all_differ_by_one_factor_are_said_to():
-    alike = {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 0.01, 5.0)}
-    text = mismatch_sentence(alike, 0.9)
-    assert "all of them 0.8000 ± 0.0018 times what they were" in text and "torque constant" in text
-    for other in (
-        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.2, 0.01, 5.0)},
-        {"coulomb": moved(0.8, 0.001, 1.0)},
-        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 4.0, 5.0)},
-        {"coulomb": moved(0.8, 0.001, 0.0), "viscous": moved(4.0, 0.01, 0.0)},
-    ):
-        assert "all of them" not in mismatch_sentence(other, 0.9)
+@pytest.mark.parametrize(
+    ("other", "friction", "words"),
+    [
+        ("old.csv", False, "1.1364 ± 0.0020 times those of old.csv"),
+        (None, False, "1.1364 ± 0.0020 times the model's"),
+        (None, True, "or friction alone is so many times what it was"),
+    ],
+)
+def test_one_factor_is_told_as_another_gain(other, friction, words):
+    """1/1.13636 is 0.88, and its interval 0.8785 to 0.8816."""
+    told = factor_sentence(estimate(1.13636, 0.001, "1"), 0.99, other, friction)
+    assert words in told and "is 12.00% ± 0.15% lower" in told
+    assert ("friction alone" in told) == friction
+    assert told.endswith("99% of the difference." if other else "99% of the unexplained force.")
 
 
 def test_a_small_share_is_no_nothing():
@@ -201,15 +204,6 @@ def test_flanks_that_give_way_by_more_than_the_gap_are_told():
     units = dict(zip(names, ("N", "m", "m", "m/s²", "m/s", "1"), strict=True))
     known = {n: estimate(v, 1e-3 * abs(v), units[n]) for n, v in values.items()}
     assert "whose flanks give way by 64.00 µm" in sentence("backlash", known, 1.0, ())
-
-
-def test_one_factor_for_all_values_is_told_only_where_all_have_changed():
-    moved = {
-        name: Moved(before, estimate(1.4 * before, 0.001 * before, "N·s/m"))
-        for name, before in (("viscous+", 30.0), ("viscous-", 28.0))
-    }
-    assert "1.4000 ± 0.0014 times what they were" in mismatch_sentence(moved, 1.0)
-    assert "times" not in mismatch_sentence(moved, 1.0, (), ["coulomb+", "inertia"])
 
 
 @pytest.mark.parametrize(("period", "told"), [(0.006, "1/4 of the period of 24 mm"), (0.0057, "")])

@@ -4,8 +4,6 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
 from ..terms.effect import ANY, Effect, Extent
@@ -112,13 +110,8 @@ def _as_gain(more: Estimate) -> str:
     return f"{size}{spread} {'higher' if gain > 0 else 'lower'}"
 
 
-def mismatch_sentence(
-    moved, share: float, rivals: Sequence[str] = (), kept: Sequence[str] = ()
-) -> str:
-    """Wrong values of the baseline as a sentence; `kept`: names of forces that are right.
-
-    A force that is counted otherwise would change these as well.
-    """
+def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
+    """Wrong values of the baseline as a sentence."""
     parts = []
     for name, m in moved.items():
         if name == GAIN and not m.before:
@@ -128,33 +121,8 @@ def mismatch_sentence(
         else:
             value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    alike = "" if kept else _alike(moved)
-    text = f"Wrong values: {'; '.join(parts)}{alike}; {unexplained(share)}"
+    text = f"Wrong values: {'; '.join(parts)}; {unexplained(share)}"
     return f"{text}{indistinct(rivals)}."
-
-
-# A common factor says something where its error is a quarter of its distance from one.
-KNOWN_FACTOR = 0.25
-
-
-def _alike(moved) -> str:
-    """Whether all values differ by one factor, as of a force that is counted otherwise."""
-    if len(moved) < 2 or not all(m.before for m in moved.values()):
-        return ""
-    factors = np.array([float(m.value) / m.before for m in moved.values()])
-    halves = np.array([float(m.estimate.half_width()) / abs(m.before) for m in moved.values()])
-    if not np.all((halves > 0) & np.isfinite(halves)):
-        return ""
-    weights = halves**-2 / np.sum(halves**-2)
-    factor, half = float(weights @ factors), float(np.sum(halves**-2) ** -0.5)
-    apart, unknown = np.abs(factors - factor) > halves, halves > abs(factor - 1)
-    if np.any(apart | unknown) or half > KNOWN_FACTOR * abs(factor - 1):
-        return ""
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    return (
-        f"; all of them {factor:.{digits}f} ± {half:.{digits}f} times what they were, as where the "
-        "recorded force (the torque constant, a unit) is that many times the model's"
-    )
 
 
 def _times(factor: Estimate) -> str:
@@ -206,6 +174,26 @@ def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()
     text = text[:1].upper() + text[1:]
     text = f"{text} since {other or 'the other recording'}; {share:.0%} of the difference"
     return f"{text}{indistinct(rivals)}."
+
+
+def factor_sentence(
+    factor: Estimate, share: float, other: str | None = None, friction: bool = False,
+    rivals: Sequence[str] = (),
+) -> str:  # fmt: skip
+    """That all forces are so many times what they were; `other`: of which recording, `None` of a
+    model; `friction`: whether friction alone does as well.
+    """
+    gain = _as_gain(factor._replace(value=factor.value - 1))
+    alone = (
+        ", or friction alone is so many times what it was, which the accelerations here do not tell"
+    )
+    whose = "the model's" if other is None else f"those of {other or 'the other recording'}"
+    text = (
+        f"One factor for all values: the forces are {quantity(factor)} times {whose}, as where "
+        f"the gain (the torque or force constant) is {gain}{alone * friction}"
+    )
+    part = unexplained(share) if other is None else f"{share:.0%} of the difference"
+    return f"{text}; {part}{indistinct(rivals)}."
 
 
 def _spoken(name: str) -> str:
