@@ -68,6 +68,24 @@ def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
     assert "with a period of 0.43 m" in told
 
 
+def test_a_slow_variation_is_told_by_its_values_along_the_stroke():
+    values = {
+        "amplitude": estimate(27.0, 400.0, "N"),
+        "unbalance_period": estimate(4.4, 35.0, "m"),
+        "at_low_end": estimate(-1.4, 0.3, "N"),
+        "at_first_quarter": estimate(-1.2, 0.1, "N"),
+        "at_third_quarter": estimate(2.2, 0.1, "N"),
+        "at_high_end": estimate(5.0, 4.0, "N"),
+    }
+    told = sentence("gravity_unbalance", values, 0.4, (), Extent(0.0, 0.5))
+    assert told.startswith(
+        "A force varies slowly along the stroke: than in the middle of the stroke it is 1.40 N ± "
+        "0.60 N less at its low end, 1.20 N ± 0.20 N less at a quarter of it and 2.20 N ± 0.20 N "
+        "more at three quarters; it does not repeat"
+    )
+    assert "cannot tell" not in told
+
+
 def test_waves_that_nearly_cancel_are_told_neither_by_a_pitch_nor_by_a_bound():
     values = {
         "cogging_sin": estimate(180.0, 100.0, "N"),

@@ -11,6 +11,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
 from ..units import spell
+from .along_stroke import Stroke, along
 from .intervals import spread
 from .regression import Fit
 from .significance import BLOCKS
@@ -31,8 +32,12 @@ def model(current: Fit, units, taken_later: float = 0.0) -> Model:
     return known.with_force_delay(-taken_later) if taken_later else known
 
 
-def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
-    """The parameters of each term of a fit, waves by amplitude and phase too."""
+def estimates(
+    current: Fit, block: np.ndarray, units: dict[str, str], stroke: Stroke | None = None
+) -> list[dict[str, Estimate]]:
+    """The parameters of each term of a fit, waves by amplitude and phase too; with the ends of the
+    `stroke`, m, those that do not repeat within it by what they are along it as well.
+    """
     known = spread(current, block)
     matrix, freedom = known.covariance, known.degrees_of_freedom(np.eye(len(known.covariance)))
     result = []
@@ -48,7 +53,9 @@ def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[di
             )
             for p, value, i in zip((*term.affine, *term.nonlinear), values, index, strict=True)
         }
-        result.append(plain | _waves(term, values, matrix[np.ix_(index, index)], plain))
+        curve = {} if stroke is None else along(current, n, known, units, stroke)
+        waves = _waves(term, values, matrix[np.ix_(index, index)], plain)
+        result.append(plain | waves | curve)
     return result
 
 
@@ -141,7 +148,9 @@ def _widened(
     """
 
     def both(name: str, own: Estimate) -> Estimate:
-        there = theirs[name]
+        there = theirs.get(name)
+        if there is None:  # a wave that repeats by those, say
+            return own
         apart = float(there.value - own.value)
         if name.startswith("phase") or name.endswith("_phase"):
             apart = float(np.angle(np.exp(1j * apart)))

@@ -12,6 +12,7 @@ from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from ..units import spell
 from . import parameters as spelled, verification
 from .acceptance import OF_BASE
+from .along_stroke import slow, together
 from .baseline import Baseline
 from .common_factor import FACTOR, factor_of
 from .dates import dated, spanning
@@ -70,6 +71,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         rivals = *selected.rivals, *map(spoken, selected.instead)
         text = sentence(effect.name, parameters, share, rivals, extent, together)
         text += _overtone(effect, parameters, result)
+        text += _told_with(findings, number, extent)
         if rest:
             text += REST
         if selected.rephased:
@@ -199,6 +201,22 @@ def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Find
                 part = f"1/{round(ratio)} of the period of {whole}"
                 return f" That is {part}: a harmonic of the same cause."
     return ""
+
+
+def _told_with(findings: Findings, number: int, extent: Extent) -> str:
+    """That the values along the stroke are those of several findings together, in words."""
+    _, selection = findings.examined_in(number)
+    current, index = selection.last, selection.term_index(number)
+    stroke = extent.low, extent.high
+    if not slow(current.terms[index], current.betas[index], stroke):
+        return ""
+    first = selection.term_index(0)
+    others = [
+        selection.selected[n - first].effect.name.replace("_", " ")
+        for n in together(current, index, stroke)
+        if n != index
+    ]
+    return f" These values along the stroke are with {' and '.join(others)}." if others else ""
 
 
 def _twins(findings: Findings, number: int) -> list[int]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
-from ..terms.effect import ANY, Effect, Extent
+from ..terms.effect import ALONG, ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..units import FORCE
@@ -39,6 +39,7 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     values = {
         n: math.inf if n in effect.periods and _unseen(estimate) else float(estimate.value)
         for n, estimate in parameters.items()
+        if not (n in ALONG and nil(estimate))
     }
     template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
@@ -47,6 +48,7 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
     sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
     words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
+    words |= {f"{n}:more": _more(estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
 
@@ -108,6 +110,12 @@ def _as_gain(more: Estimate) -> str:
     digits = max(0, 1 - math.floor(math.log10(100 * half))) if half > 0 else 1
     size, spread = f"{100 * abs(gain):.{digits}f}%", f" ± {100 * half:.{digits}f}%" * (half > 0)
     return f"{size}{spread} {'higher' if gain > 0 else 'lower'}"
+
+
+def _more(estimate: Estimate) -> str:
+    """A difference in words: "1.50 N ± 0.20 N less"."""
+    size = quantity(estimate._replace(value=abs(estimate.value)))
+    return f"{size} {'more' if estimate.value > 0 else 'less'}"
 
 
 def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:

@@ -84,7 +84,8 @@ def _over_position(term: Cogging | ForceRipple) -> Waves:
 
 _slowly = slowly(
     "pitch",
-    "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the stroke",
+    "A force varies slowly along the stroke",
+    "; it does not repeat within the stroke",
 )
 
 

@@ -67,8 +67,8 @@ def _told(values: Mapping[str, float], extent: Extent) -> str | None:
 
 _slowly = slowly(
     "unbalance_period",
-    "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the "
-    "stroke, so that a spring or a cable would look the same",
+    "A force varies slowly along the stroke",
+    "; it does not repeat within the stroke, so that a spring or a cable would look the same",
 )
 
 GRAVITY_UNBALANCE = Effect(

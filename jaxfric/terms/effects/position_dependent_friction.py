@@ -47,7 +47,8 @@ POSITION_DEPENDENT_FRICTION = Effect(
     waves=lambda term: Waves("position", True, SIDE),
     variant=slowly(
         "friction_period",
-        "Friction varies slowly along the stroke, by {amplitude}: it does not repeat within the "
-        "stroke, as with a guide or a belt that is tight in one place",
+        "Friction varies slowly along the stroke",
+        "; it does not repeat within the stroke, as with a guide or a belt that is tight in one "
+        "place",
     ),
 )

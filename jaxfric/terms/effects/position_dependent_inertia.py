@@ -63,5 +63,5 @@ POSITION_DEPENDENT_INERTIA = Effect(
     separate_by="Cross the stroke at two accelerations: a weight does not scale with them. A "
     "position that is off once a turn, by an encoder off centre, does: compare a second sensor.",
     grid=periods,
-    variant=slowly("inertia_period", "Inertia varies slowly along the stroke, by {amplitude}"),
+    variant=slowly("inertia_period", "Inertia varies slowly along the stroke"),
 )
