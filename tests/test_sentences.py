@@ -1,6 +1,7 @@
 """What is said of findings, as an engineer says it."""
 
 import math
+import types
 
 import numpy as np
 import pytest
@@ -221,7 +222,57 @@ def test_flanks_that_give_way_by_more_than_the_gap_are_told():
     values = dict(zip(names, (10.0, 1.5e-6, 6.4e-5, 7.8, 0.03, 0.0), strict=True))
     units = dict(zip(names, ("N", "m", "m", "m/s²", "m/s", "1"), strict=True))
     known = {n: estimate(v, 1e-3 * abs(v), units[n]) for n, v in values.items()}
-    assert "whose flanks give way by 64.00 µm" in sentence("backlash", known, 1.0, ())
+    known |= _derived(known)
+    told = sentence("backlash", known, 1.0, ())
+    assert "crosses a gap of 3.0000 µm ± " in told and "whose flanks give way by 64.00 µm" in told
+
+
+def _derived(known):
+    evidence = types.SimpleNamespace(motion=types.SimpleNamespace(unit_names={"position": "m"}))
+    return reported._derived(EFFECTS["backlash"], known, Extent(), evidence)
+
+
+def test_a_gap_is_told_from_flank_to_flank():
+    known = {
+        "backlash_force": estimate(7.7, 0.6, "N·m"),
+        "half_gap": estimate(0.0015, 0.0001, "m"),
+    }
+    gap = _derived(known)["gap"]
+    assert (float(gap.value), float(gap.standard_error)) == (0.003, 0.0002)
+    told = sentence("backlash", known | {"gap": gap}, 1.0, ())
+    assert "while a gap of 3.00 mm ± 0.40 mm is crossed" in told
+    most = gap._replace(standard_error=np.float64(0.002))
+    told = sentence("backlash", known | {"gap": most}, 1.0, ())
+    assert "a gap of at most 7 mm is crossed" in told
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "words"),
+    [
+        (1.88, 0.1, "by speed to the power of 1.88 ± 0.20;"),
+        (0.3, 0.3, "by speed to a power below one;"),
+        (0.5, 0.4, "by speed to a power other than one;"),
+    ],
+)
+def test_a_power_of_speed_is_told_by_what_is_known_of_it(value, error, words):
+    known = {"power_force": estimate(3.0, 0.1, "N"), "exponent": estimate(value, error, "1")}
+    assert words in sentence("viscous_nonlinearity", known, 0.1, ())
+
+
+def test_warming_of_which_only_the_change_is_known_is_told_by_that():
+    known = {
+        "thermal_viscous": estimate(8.0, 47.0, "N·s/m"),
+        "time_constant": estimate(180.0, 900.0, "s"),
+        "over_record": estimate(-2.2, 0.7, "N·s/m"),
+    }
+    told = sentence("thermal_drift", known, 0.12, ())
+    assert told.startswith(
+        "Viscous friction falls as the machine warms: by 2.2 N·s/m ± 1.4 N·s/m over the record; "
+        "where it settles, and how fast, this recording cannot tell;"
+    )
+    known["over_record"] = estimate(-2.2, 2.0, "N·s/m")
+    told = sentence("thermal_drift", known, 0.12, ())
+    assert told.startswith("Viscous friction drifts as the machine warms; where it settles,")
 
 
 @pytest.mark.parametrize(("period", "told"), [(0.006, "1/4 of the period of 24 mm"), (0.0057, "")])

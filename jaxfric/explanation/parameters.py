@@ -10,11 +10,12 @@ from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
+from ..terms.sample import Scales
 from ..units import spell
-from .along_stroke import Stroke, along
 from .intervals import spread
 from .regression import Fit
 from .significance import BLOCKS
+from .slow_changes import along, over_record
 
 
 def whole(current: Fit) -> AbstractTerm:
@@ -33,10 +34,10 @@ def model(current: Fit, units, taken_later: float = 0.0) -> Model:
 
 
 def estimates(
-    current: Fit, block: np.ndarray, units: dict[str, str], stroke: Stroke | None = None
+    current: Fit, block: np.ndarray, units: dict[str, str], limits: Scales | None = None
 ) -> list[dict[str, Estimate]]:
-    """The parameters of each term of a fit, waves by amplitude and phase too; with the ends of the
-    `stroke`, m, those that do not repeat within it by what they are along it as well.
+    """The parameters of each term of a fit, waves by amplitude and phase too; with the `limits` of
+    the recording what changes slowly by how much it changes as well.
     """
     known = spread(current, block)
     matrix, freedom = known.covariance, known.degrees_of_freedom(np.eye(len(known.covariance)))
@@ -53,9 +54,11 @@ def estimates(
             )
             for p, value, i in zip((*term.affine, *term.nonlinear), values, index, strict=True)
         }
-        curve = {} if stroke is None else along(current, n, known, units, stroke)
-        waves = _waves(term, values, matrix[np.ix_(index, index)], plain)
-        result.append(plain | waves | curve)
+        found = plain | _waves(term, values, matrix[np.ix_(index, index)], plain)
+        if limits is not None and n:
+            found |= along(current, n, known, units, limits)
+            found |= over_record(current, n, known, units, limits)
+        result.append(found)
     return result
 
 

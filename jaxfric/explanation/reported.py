@@ -12,7 +12,6 @@ from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from ..units import spell
 from . import parameters as spelled, verification
 from .acceptance import OF_BASE
-from .along_stroke import slow, together
 from .baseline import Baseline
 from .common_factor import FACTOR, factor_of
 from .dates import dated, spanning
@@ -25,6 +24,7 @@ from .quantities import quantity, rise
 from .regression import Fit
 from .selection import SelectedTerm
 from .sentences import changed_sentence, factor_sentence, mismatch_sentence, sentence, spoken
+from .slow_changes import slow, together
 from .uncertainty import estimated
 from .verdict import overlapping
 

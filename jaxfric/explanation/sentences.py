@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
-from ..terms.effect import ALONG, ANY, Effect, Extent
+from ..terms.effect import ANY, CHANGES, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..units import FORCE
@@ -39,15 +39,19 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     values = {
         n: math.inf if n in effect.periods and _unseen(estimate) else float(estimate.value)
         for n, estimate in parameters.items()
-        if not (n in ALONG and nil(estimate))
+        if not (n in CHANGES and nil(estimate))
     }
-    template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
+    vague = effect.vague(values, extent) if _sizeless(effect, parameters) else None
+    template = (
+        vague or effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
+    )
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     if _beyond(effect, parameters, extent.force):
         words["amplitude"] = UNSEEN
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
     sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
     words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
+    words |= {f"{n}:power": _as_power(estimate) for n, estimate in parameters.items()}
     words |= {f"{n}:more": _more(estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
@@ -89,6 +93,12 @@ def _unseen(estimate: Estimate) -> bool:
     return nil(estimate) or math.isinf(float(estimate.standard_error))
 
 
+def _sizeless(effect: Effect, parameters: Mapping[str, Estimate]) -> bool:
+    """Whether all that its force is proportional to may be nil."""
+    names = {p.name for term in effect.shapes(ANY) for p in term.affine}
+    return all(_unseen(estimate) for name, estimate in parameters.items() if name in names)
+
+
 def _beyond(effect: Effect, parameters: Mapping[str, Estimate], force: float) -> bool:
     """Whether the most that a force's amplitude may be is more than the usual force, N: waves that
     nearly cancel have any amplitude together, and such a bound is none.
@@ -110,6 +120,16 @@ def _as_gain(more: Estimate) -> str:
     digits = max(0, 1 - math.floor(math.log10(100 * half))) if half > 0 else 1
     size, spread = f"{100 * abs(gain):.{digits}f}%", f" ± {100 * half:.{digits}f}%" * (half > 0)
     return f"{size}{spread} {'higher' if gain > 0 else 'lower'}"
+
+
+def _as_power(exponent: Estimate) -> str:
+    """An exponent in words, or on which side of proportion it is."""
+    if not _unseen(exponent):
+        return f"to the power of {quantity(exponent)}"
+    low, high = map(float, exponent.interval())
+    if high < 1:
+        return "to a power below one"
+    return "to a power above one" if low > 1 else "to a power other than one"
 
 
 def _more(estimate: Estimate) -> str:

@@ -149,6 +149,10 @@ RECURS = 2.0
 
 # Places along the stroke at which a slow curve is told, by name: from −1 at its low end to 1.
 ALONG = {"at_low_end": -1.0, "at_first_quarter": -0.5, "at_third_quarter": 0.5, "at_high_end": 1.0}
+# What settles is at the end of the record so much more than at its start.
+OVER_RECORD = "over_record"
+# Changes, of which nothing is told that may be nil.
+CHANGES = (*ALONG, OVER_RECORD)
 _PLACES = "at its low end", "at a quarter of it", "at three quarters", "at its high end"
 
 
@@ -273,7 +277,9 @@ class Effect:
       sentence where the name promises more than the values hold. `sizes`: parameters of which only
       the most is known where other terms could stand in for all of it. `moment`: the parameter that
       dates it; `lasting`: that by which it is over again. `dates`: times, s, that a term holds as
-      given numbers, by name. `derived`: values that follow from its parameters, by name.
+      given numbers, by name. `derived`: values that follow from its parameters, by name. `settles`:
+      the time constant with which it dies out from the start of the record. `vague`: another
+      sentence where its size may be nil with all shapes that it may have, though it acts.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -322,6 +328,8 @@ class Effect:
     lasting: str = ""
     dates: Callable[[Any], dict[str, float]] = _no_dates
     derived: Callable[[Mapping[str, float], Extent], dict[str, Derived]] = _none_derived
+    settles: str = ""
+    vague: Callable[[Mapping[str, float], Extent], str | None] = _no_variant
     drawn: bool = True
 
     def __post_init__(self) -> None:

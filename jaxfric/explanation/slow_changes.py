@@ -1,4 +1,7 @@
-"""What varies slowly along the stroke, by its values there: known where period and size are not."""
+"""What changes slowly, along the stroke or over the record, by how much it changes there.
+
+That is known where its period or time constant, and its size, may be any together.
+"""
 
 import jax.numpy as jnp
 import numpy as np
@@ -7,8 +10,10 @@ from jaxtyping import Float
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.base import AbstractTerm
-from ..terms.effect import ALONG, REPEATED
+from ..terms.effect import ALONG, OVER_RECORD, REPEATED
+from ..terms.effects import traits
 from ..terms.position import POSITION_ONLY
+from ..terms.sample import Scales
 from ..units import POSITION, spell
 from .intervals import Spread
 from .regression import Fit
@@ -46,13 +51,18 @@ def together(current: Fit, number: int, stroke: Stroke) -> list[int]:
     ]  # fmt: skip
 
 
+def stroke_of(limits: Scales) -> Stroke:
+    """The ends of a recording's stroke, m."""
+    return float(limits.low), float(limits.high)
+
+
 def along(
-    current: Fit, number: int, known: Spread, units: dict[str, str], stroke: Stroke
+    current: Fit, number: int, known: Spread, units: dict[str, str], limits: Scales
 ) -> dict[str, Estimate]:
     """What a slow wave is at the places of [`ALONG`][] more than in the middle of the stroke, with
     the terms it is told with; empty for another term, and where that is not known.
     """
-    term = current.terms[number]
+    term, stroke = current.terms[number], stroke_of(limits)
     if not slow(term, current.betas[number], stroke):
         return {}
     low, high = stroke
@@ -64,14 +74,41 @@ def along(
         values += value
         weights[:, current.indices(n)] = gradient
     weights, more = weights[1:] - weights[0], values[1:] - values[0]
+    return _estimates(dict(zip(ALONG, more, strict=True)), weights, term, known, units)
+
+
+def over_record(
+    current: Fit, number: int, known: Spread, units: dict[str, str], limits: Scales
+) -> dict[str, Estimate]:
+    """By how much a force that dies out with time, or one that settles, is more at the end of the
+    record than at its start, in its own unit; empty for another term, and where that is not known.
+    """
+    term = current.terms[number]
+    names = [p.name for p in term.nonlinear]
+    if not traits(term).settles or len(term.affine) != 1:
+        return {}
+    at = names.index(traits(term).settles)
+    size, constant = float(current.alphas[number][0]), float(current.betas[number][at])
+    past = float(limits.duration) / constant
+    weights = np.zeros((1, len(known.covariance)))
+    weights[0, current.indices(number)[0]] = np.expm1(-past)
+    weights[0, current.indices(number)[1 + at]] = size * np.exp(-past) * past / constant
+    return _estimates({OVER_RECORD: size * np.expm1(-past)}, weights, term, known, units)
+
+
+def _estimates(
+    values: dict[str, float], weights: np.ndarray, term: AbstractTerm, known: Spread,
+    units: dict[str, str],
+) -> dict[str, Estimate]:  # fmt: skip
+    """Sums of parameters, by their names; empty where they are not known."""
     errors = known.errors(weights)
     if not np.all(np.isfinite(errors)):
         return {}
     unit = spell(term.affine[0].dimension, units)
-    rows = zip(ALONG, more, errors, known.degrees_of_freedom(weights), strict=True)
+    rows = zip(values.items(), errors, known.degrees_of_freedom(weights), strict=True)
     return {
         name: Estimate(np.float64(value), np.float64(error), unit, float(freedom))
-        for name, value, error, freedom in rows
+        for (name, value), error, freedom in rows
     }
 
 

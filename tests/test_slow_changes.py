@@ -1,4 +1,4 @@
-"""What varies slowly along the stroke is told by its values there."""
+"""What changes slowly along the stroke or over the record is told by how much it changes."""
 
 import dataclasses
 
@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from jaxfric import Recording, terms
-from jaxfric.explanation import along_stroke, explain, intervals, parameters
+from jaxfric.explanation import explain, intervals, parameters, slow_changes
 from jaxfric.explanation.regression import Fit
-from jaxfric.terms.effect import ALONG
+from jaxfric.terms.effect import ALONG, ANY, OVER_RECORD
 
 from .test_explain import healthy as healthy
 
 STROKE = (-0.1, 0.3)
 MIDDLE = 0.1
 PLACES = MIDDLE + 0.2 * np.array(list(ALONG.values()))
+LIMITS = ANY._replace(low=STROKE[0], high=STROKE[1], duration=20.0)
 UNITS = {"force": "N", "position": "m"}
 
 
@@ -45,7 +46,7 @@ def fitted(laws, noise=0.1):
 
 def curve(current, number):
     known = intervals.spread(current, np.arange(400) // 17)
-    return along_stroke.along(current, number, known, UNITS, STROKE)
+    return slow_changes.along(current, number, known, UNITS, LIMITS)
 
 
 # Of six strokes a sine is nearly a parabola.
@@ -59,7 +60,7 @@ def wave(x):
 
 def test_the_curve_is_known_where_amplitude_and_period_are_not():
     with jax.enable_x64(True):
-        found = parameters.estimates(fitted([WAVE]), np.arange(400) // 17, UNITS, STROKE)[1]
+        found = parameters.estimates(fitted([WAVE]), np.arange(400) // 17, UNITS, LIMITS)[1]
     truth = wave(PLACES) - wave(MIDDLE)
     assert list(found)[-4:] == list(ALONG) and found["at_low_end"].unit == "N"
     for name, value in zip(ALONG, truth, strict=True):
@@ -74,7 +75,7 @@ def test_terms_that_overlap_are_told_together():
     with jax.enable_x64(True):
         current = fitted([WAVE, STOP])
         found = curve(current, 1)
-    assert along_stroke.together(current, 1, STROKE) == [1, 2]
+    assert slow_changes.together(current, 1, STROKE) == [1, 2]
     stop = 60.0 * np.maximum([*PLACES - 0.02, MIDDLE - 0.02], 0.0)
     truth = wave(PLACES) - wave(MIDDLE) + stop[:-1] - stop[-1]
     np.testing.assert_allclose([float(e.value) for e in found.values()], truth, rtol=1e-6)
@@ -85,7 +86,7 @@ def test_what_repeats_within_the_stroke_is_told_by_its_period():
     with jax.enable_x64(True):
         current = fitted([WAVE, cogging])
         assert curve(current, 2) == {} and curve(current, 0) == {}
-        assert along_stroke.together(current, 1, STROKE) == [1]
+        assert slow_changes.together(current, 1, STROKE) == [1]
 
 
 def test_friction_that_varies_along_the_stroke_is_told_by_itself():
@@ -93,9 +94,31 @@ def test_friction_that_varies_along_the_stroke_is_told_by_itself():
     with jax.enable_x64(True):
         current = fitted([law])
         found = curve(current, 1)
-    assert along_stroke.together(current, 1, STROKE) == [1]
+    assert slow_changes.together(current, 1, STROKE) == [1]
     truth = 0.1 * (wave(PLACES) - wave(MIDDLE))
     np.testing.assert_allclose([float(e.value) for e in found.values()], truth, rtol=1e-6)
+
+
+@pytest.mark.parametrize("constant", [8.0, 60.0])
+def test_warming_is_told_by_its_change_over_the_record(constant):
+    """Slower than the record it is nearly a straight line, of any size and time constant."""
+    time = np.linspace(0.0, 20.0, 400)
+    speed = 0.2 * np.sin(7 * time)
+    past = np.exp(-time / constant)
+    columns = np.stack([speed, past * speed], axis=1)
+    slopes = (30.0 * past * time / constant**2 * speed)[:, None]
+    residual = 0.01 * np.random.default_rng(2).normal(size=400)
+    law = terms.ThermalDrift(terms.Viscous())
+    current = Fit(
+        (terms.Viscous(), law), (np.zeros(0), np.array([constant])),
+        (np.array([50.0]), np.array([30.0])), columns, slopes, residual, 1.0,
+    )  # fmt: skip
+    found = parameters.estimates(current, np.arange(400) // 17, UNITS, LIMITS)[1]
+    change = found[OVER_RECORD]
+    assert float(change.value) == pytest.approx(30.0 * (np.exp(-20.0 / constant) - 1))
+    assert change.unit == "N·s/m" and float(change.half_width()) < 0.05
+    size = found["thermal_viscous"]
+    assert (float(size.half_width()) > 10 * float(change.half_width())) == (constant > 20)
 
 
 @pytest.mark.slow
