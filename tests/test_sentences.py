@@ -6,7 +6,7 @@ import types
 import numpy as np
 import pytest
 
-from jaxfric.explanation import reported, summary
+from jaxfric.explanation import reported, summary, wording
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
 from jaxfric.explanation.sentences import factor_sentence, mismatch_sentence, sentence
@@ -321,3 +321,57 @@ def test_a_command_that_is_larger_is_told_as_a_force_constant_that_is_lower(more
     }
     said = sentence("position_dependent_force_constant", found, 0.9, ())
     assert f"it is {text} of the stroke and 33.33% ± 0.89% lower at the high end than" in said
+
+
+def held_out(**more):
+    """Figures of a held-out recording that other values of the same model fit."""
+    pair = {"before": 0.1, "after": 0.1}
+    return {
+        "force_error": pair,
+        "holdout_force_error": pair,
+        "filtered_force_error": {"before": 0.3, "after": 0.01},
+        "filtered_holdout_force_error": {"before": 0.1, "after": 0.1},
+        "filtered_holdout_refitted_error": 0.01,
+        "holdout_refitted_error": 0.03,
+        "holdout_noise_floor": 0.03,
+    } | more
+
+
+VALUES = {"coulomb-": {"here": 1.75, "there": 1.5, "standard_error": 0.04, "unit": "N·m"}}
+
+
+@pytest.mark.parametrize("name", ["thermal_drift", "gain_drift"])
+def test_what_begins_anew_in_each_recording_is_no_change_of_the_machine(name):
+    finding = Finding(name, "", "", (), "", {}, 0.9, None, 0.002)
+    fit = held_out(holdout_values=VALUES)
+    (remark,) = summary._elsewhere(fit, [finding])
+    spoken = name.replace("_", " ").capitalize()
+    assert f"other values hold there. {spoken} begins anew" in remark.text
+    assert "machine has changed" not in remark.text
+    said = wording.summary("explained", "gaussian", [finding], [], fit, [])
+    assert "coulomb- is 1.50 instead of 1.75 N·m. " in said and "begins anew" in said
+    assert "the machine changed" not in said
+    # Once is enough.
+    said = wording.summary("explained", "gaussian", [finding], [], fit, [remark.to_dict()])
+    assert "coulomb- is 1.50 instead of 1.75 N·m." in said and "begins anew" not in said
+    other = finding._replace(effect="cogging")
+    assert "The machine has changed" in summary._elsewhere(fit, [other])[0].text
+
+
+@pytest.mark.parametrize(("floor", "told"), [(0.03, True), (0.01, False)])
+def test_of_a_healthy_machine_it_is_said_whether_what_is_left_elsewhere_is_a_fault(floor, told):
+    fit = held_out(holdout_noise_floor=floor, holdout_values={})
+    said = wording.summary("consistent", "gaussian", [], [], fit, [])
+    assert ("no physics is missing there either" in said) == told
+    assert "does not determine the values" in said and "moves like" in said
+
+
+def test_a_law_that_acts_more_on_the_held_out_recording_may_lack_something_there():
+    finding = Finding("compliance", "", "", (), "", {}, 0.9, None, 0.002)
+    fit = held_out(filtered_holdout_refitted_error=0.09)
+    fit["filtered_holdout_force_error"] = {"before": 0.5, "after": 0.1}
+    (remark,) = summary._elsewhere(fit, [finding])
+    assert "compliance takes 49% of the force there and 30% here" in remark.text
+    assert remark.text.count("Explain that one") == 1
+    fit["filtered_holdout_force_error"] = {"before": 0.2, "after": 0.1}
+    assert "compliance" not in summary._elsewhere(fit, [finding])[0].text
