@@ -349,11 +349,11 @@ def test_what_begins_anew_in_each_recording_is_no_change_of_the_machine(name):
     assert f"other values hold there. {spoken} begins anew" in remark.text
     assert "machine has changed" not in remark.text
     said = wording.summary("explained", "gaussian", [finding], [], fit, [])
-    assert "coulomb- is 1.50 instead of 1.75 N·m. " in said and "begins anew" in said
+    assert "coulomb- is 1.500 instead of 1.750 N·m. " in said and "begins anew" in said
     assert "the machine changed" not in said
     # Once is enough.
     said = wording.summary("explained", "gaussian", [finding], [], fit, [remark.to_dict()])
-    assert "coulomb- is 1.50 instead of 1.75 N·m." in said and "begins anew" not in said
+    assert "coulomb- is 1.500 instead of 1.750 N·m." in said and "begins anew" not in said
     other = finding._replace(effect="cogging")
     assert "The machine has changed" in summary._elsewhere(fit, [other])[0].text
 
