@@ -10,7 +10,8 @@ import pytest
 from jaxfric import Recording, terms
 from jaxfric.explanation import explain, intervals, parameters, slow_changes
 from jaxfric.explanation.regression import Fit
-from jaxfric.terms.effect import ALONG, ANY, OVER_RECORD
+from jaxfric.terms.effect import ANY
+from jaxfric.terms.slow import ALONG, OVER_RECORD
 
 from .test_explain import healthy as healthy
 

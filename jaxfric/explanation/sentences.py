@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
-from ..terms.effect import ANY, CHANGES, Effect, Extent
+from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
+from ..terms.slow import CHANGES
 from ..units import FORCE
 from .quantities import UNSEEN, nil, quantity, turns
 

@@ -10,10 +10,11 @@ from jaxtyping import Float
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.base import AbstractTerm
-from ..terms.effect import ALONG, OVER_RECORD, REPEATED
+from ..terms.effect import REPEATED
 from ..terms.effects import traits
 from ..terms.position import POSITION_ONLY
 from ..terms.sample import Scales
+from ..terms.slow import ALONG, OVER_RECORD
 from ..units import POSITION, spell
 from .intervals import Spread
 from .regression import Fit

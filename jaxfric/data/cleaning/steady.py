@@ -14,8 +14,8 @@ CLEAR = 7.0
 FINE = 0.01
 # A line through rounded stamps is off by up to this part of the last digit at either end.
 OFF = 0.125
-# A stamp says within how many samples of it the clock is checked. Beyond a few of them a clock that
-# stops and catches up, as one of a busy computer does, would not show.
+# A stamp that is moved by a few samples is rounded to several. Beyond that a clock that stops and
+# catches up between two stamps that differ, as one of a busy computer does, does not show.
 FEW_STEPS = 3.0
 # Late by less than a thousandth of a step changes a velocity by less than that: no repair.
 NEGLIGIBLE = 0.001

@@ -7,9 +7,10 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw
-from ..effect import SIDE, Effect, Waves, slowly
+from ..effect import SIDE, Effect, Waves
 from ..position import WITH_DIRECTION, any_period, cycles, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
+from ..slow import slowly
 
 
 class PositionDependentFriction(AbstractLaw):

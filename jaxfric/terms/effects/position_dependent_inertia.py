@@ -8,9 +8,10 @@ from jaxtyping import Array, Float
 
 from ...units import INERTIA, POSITION
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect, View, slowly
+from ..effect import Effect, View
 from ..position import any_period, cycles, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
+from ..slow import slowly
 from ..text import TURN, literal
 
 

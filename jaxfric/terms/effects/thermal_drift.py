@@ -9,9 +9,10 @@ from jaxtyping import Array, Float
 
 from ...units import TIME
 from ..base import AbstractTerm
-from ..effect import OVER_RECORD, Effect, Extent
+from ..effect import Effect, Extent
 from ..friction import Coulomb, Viscous
 from ..sample import UNKNOWN, Parameter, Scales
+from ..slow import OVER_RECORD
 from ..text import signed
 from ..time import AbstractModulated
 
