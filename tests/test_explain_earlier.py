@@ -7,15 +7,20 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import terms
+from jaxfric import models, terms
 from jaxfric.cli import main
-from jaxfric.explanation import Earlier, explain
+from jaxfric.explanation import Earlier, common_factor, explain
+from jaxfric.explanation.baseline import Baseline
 from jaxfric.explanation.finding import Moved
+from jaxfric.explanation.mismatch import Mismatch
 from jaxfric.explanation.sentences import changed_sentence, parameter
 from jaxfric.identification.uncertainty import Estimate
 
 from .test_cli import write_axis
 from .test_explain import healthy as healthy, planted
+
+NAMES = ("inertia", "coulomb+", "viscous+", "coulomb-", "viscous-")
+VALUES = (5.0, 22.0, 66.0, 18.0, 54.0)
 
 
 @pytest.fixture(autouse=True)
@@ -46,6 +51,35 @@ def test_more_coulomb_friction_is_told_with_its_change(healthy):
 
 
 @pytest.mark.slow
+def test_another_gain_is_told_by_one_number(healthy):
+    old, new = healthy
+    found = explain(dataclasses.replace(new, force=new.force / 0.88), Earlier(old))
+    assert found.verdict == "explained"
+    (finding,) = found.findings
+    factor = finding.parameters["force_factor"]
+    assert factor.before == 1.0 and float(factor.standard_error) < 0.01
+    low, high = factor.interval()
+    assert low < 1 / 0.88 < high
+    assert (
+        finding.sentence.startswith("One factor for all values") and "% lower" in finding.sentence
+    )
+    assert "friction alone" not in finding.sentence
+    for name in ("inertia", "coulomb+", "coulomb-", "viscous+"):
+        value = finding.parameters[name]
+        assert float(value.value / value.before) == pytest.approx(float(factor.value))
+
+
+@pytest.mark.slow
+def test_friction_that_has_grown_by_one_factor_is_no_gain(healthy):
+    """The inertia is what it was."""
+    old, new = healthy
+    law = terms.Directional(terms.Coulomb() + terms.Viscous())
+    found = explain(planted(new, law, (4.4, 13.2, 3.6, 10.8)), Earlier(old))
+    assert found.verdict == "explained"
+    assert "force_factor" not in found.findings[0].parameters
+
+
+@pytest.mark.slow
 def test_the_same_machine_has_not_changed(healthy):
     found = explain(healthy[1], Earlier(healthy[0]))
     assert found.verdict == "consistent" and not found.findings
@@ -60,6 +94,28 @@ def test_another_homing_is_no_change(healthy):
     moved = dataclasses.replace(new, position=new.position + jnp.asarray(0.0037))
     found = explain(moved, Earlier(old))
     assert found.verdict == "consistent", found.summary
+
+
+def test_values_that_the_earlier_recording_hardly_shows_tell_no_factor():
+    model = models.from_parameters(models.coulomb_viscous(), dict(zip(NAMES, VALUES, strict=True)))
+    names = list(model.parameters)
+    errors = np.array([0.3 * abs(float(v)) for v in model.parameters.values()])
+    errors[names.index("viscous-")] *= 2
+    errors[names.index("inertia")] = np.inf
+    known = Baseline(model.term, "recording a.csv", model, np.diag(errors**2))
+    assert [names[i] for i in common_factor._unknown(known)] == ["inertia", "viscous-"]
+    assert common_factor._unknown(known._replace(covariance=None)) == ()
+
+
+def test_a_factor_puts_the_whole_model_right_but_for_what_is_unknown():
+    model = models.from_parameters(models.coulomb_viscous(), dict(zip(NAMES, VALUES, strict=True)))
+    wrong = Mismatch({0: 1.0, 1: 2.0}, 0.9, 0.002, 1.0)
+    assert common_factor.put_right(model, None) == (model, ())
+    assert common_factor.put_right(model, wrong) == (model, (0, 1)) and wrong.numbers == 2
+    one = wrong._replace(factor=1.2, unknown=(4,))
+    right, free = common_factor.put_right(model, one)
+    assert free == (4,) and one.numbers == 1
+    np.testing.assert_allclose(right.alpha, 1.2 * np.asarray(model.alpha))
 
 
 def test_the_sentence_has_both_values_and_the_error_of_the_change():

@@ -174,6 +174,24 @@ def test_rounded_stamps_of_a_steady_clock_keep_every_sample(rate, start, down, l
     assert "moves them by up to" in " ".join(tidy.notes) or np.allclose(stamps, start + true)
 
 
+def test_stamps_that_are_rounded_to_many_samples_are_a_warning():
+    """Between two of them the clock may have stopped and caught up."""
+    true = np.arange(30_000) / 100
+    tidy = put_in_order(np.floor(true), axis(true))
+    assert np.max(np.abs(np.diff(tidy.signals["time"]) * 100 - 1)) < 0.01
+    assert tidy.notes[0].startswith("Warning: The time stamps are rounded")
+    assert "That is 50 samples" in tidy.notes[0] and "more digits" in tidy.notes[0]
+    tidy = put_in_order(np.floor(true * 50) / 50, axis(true))
+    assert tidy.notes[0].startswith("The time stamps are rounded")
+
+
+def test_stamps_whose_digit_tells_no_rate_are_refused():
+    """Written with nine digits since 1970: 51 s in steps of 10 s, a rate within 5 %."""
+    true = 1.7e9 + np.arange(4887) / 100
+    with pytest.raises(ValueError, match="time does not increase at .* with more digits"):
+        put_in_order(np.round(true, -1), axis(true - 1.7e9))
+
+
 @settings(max_examples=30)
 @given(
     kind=st.sampled_from(["normal", "uniform", "exponential"]),

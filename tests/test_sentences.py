@@ -6,10 +6,10 @@ import types
 import numpy as np
 import pytest
 
-from jaxfric.explanation import errors, reported, summary
+from jaxfric.explanation import errors, reported, summary, wording
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
-from jaxfric.explanation.sentences import mismatch_sentence, sentence
+from jaxfric.explanation.sentences import factor_sentence, mismatch_sentence, sentence
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effect import Extent
 from jaxfric.terms.effects import EFFECTS
@@ -67,6 +67,24 @@ def test_what_does_not_repeat_within_the_stroke_is_a_slow_variation():
     assert "varies slowly along the stroke, by 0.99 N" in told and "0.43" not in told
     told = sentence("position_dependent_friction", values, 0.14, (), Extent(0.0, 2.0))
     assert "with a period of 0.43 m" in told
+
+
+def test_a_slow_variation_is_told_by_its_values_along_the_stroke():
+    values = {
+        "amplitude": estimate(27.0, 400.0, "N"),
+        "unbalance_period": estimate(4.4, 35.0, "m"),
+        "at_low_end": estimate(-1.4, 0.3, "N"),
+        "at_first_quarter": estimate(-1.2, 0.1, "N"),
+        "at_third_quarter": estimate(2.2, 0.1, "N"),
+        "at_high_end": estimate(5.0, 4.0, "N"),
+    }
+    told = sentence("gravity_unbalance", values, 0.4, (), Extent(0.0, 0.5))
+    assert told.startswith(
+        "A force varies slowly along the stroke: than in the middle of the stroke it is 1.40 N ± "
+        "0.60 N less at its low end, 1.20 N ± 0.20 N less at a quarter of it and 2.20 N ± 0.20 N "
+        "more at three quarters; it does not repeat"
+    )
+    assert "cannot tell" not in told
 
 
 def test_waves_that_nearly_cancel_are_told_neither_by_a_pitch_nor_by_a_bound():
@@ -150,17 +168,20 @@ def moved(value, error, before):
     return Moved(before, estimate(value, error, "N"))
 
 
-def test_values_that_all_differ_by_one_factor_are_said_to():
-    alike = {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 0.01, 5.0)}
-    text = mismatch_sentence(alike, 0.9)
-    assert "all of them 0.8000 ± 0.0018 times what they were" in text and "torque constant" in text
-    for other in (
-        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.2, 0.01, 5.0)},
-        {"coulomb": moved(0.8, 0.001, 1.0)},
-        {"coulomb": moved(0.8, 0.001, 1.0), "viscous": moved(4.0, 4.0, 5.0)},
-        {"coulomb": moved(0.8, 0.001, 0.0), "viscous": moved(4.0, 0.01, 0.0)},
-    ):
-        assert "all of them" not in mismatch_sentence(other, 0.9)
+@pytest.mark.parametrize(
+    ("other", "friction", "words"),
+    [
+        ("old.csv", False, "1.1364 ± 0.0020 times those of old.csv"),
+        (None, False, "1.1364 ± 0.0020 times the model's"),
+        (None, True, "or friction alone is so many times what it was"),
+    ],
+)
+def test_one_factor_is_told_as_another_gain(other, friction, words):
+    """1/1.13636 is 0.88, and its interval 0.8785 to 0.8816."""
+    told = factor_sentence(estimate(1.13636, 0.001, "1"), 0.99, other, friction)
+    assert words in told and "is 12.00% ± 0.15% lower" in told
+    assert ("friction alone" in told) == friction
+    assert told.endswith("99% of the difference." if other else "99% of the unexplained force.")
 
 
 def test_a_small_share_is_no_nothing():
@@ -201,16 +222,57 @@ def test_flanks_that_give_way_by_more_than_the_gap_are_told():
     values = dict(zip(names, (10.0, 1.5e-6, 6.4e-5, 7.8, 0.03, 0.0), strict=True))
     units = dict(zip(names, ("N", "m", "m", "m/s²", "m/s", "1"), strict=True))
     known = {n: estimate(v, 1e-3 * abs(v), units[n]) for n, v in values.items()}
-    assert "whose flanks give way by 64.00 µm" in sentence("backlash", known, 1.0, ())
+    known |= _derived(known)
+    told = sentence("backlash", known, 1.0, ())
+    assert "crosses a gap of 3.0000 µm ± " in told and "whose flanks give way by 64.00 µm" in told
 
 
-def test_one_factor_for_all_values_is_told_only_where_all_have_changed():
-    moved = {
-        name: Moved(before, estimate(1.4 * before, 0.001 * before, "N·s/m"))
-        for name, before in (("viscous+", 30.0), ("viscous-", 28.0))
+def _derived(known):
+    evidence = types.SimpleNamespace(motion=types.SimpleNamespace(unit_names={"position": "m"}))
+    return reported._derived(EFFECTS["backlash"], known, Extent(), evidence)
+
+
+def test_a_gap_is_told_from_flank_to_flank():
+    known = {
+        "backlash_force": estimate(7.7, 0.6, "N·m"),
+        "half_gap": estimate(0.0015, 0.0001, "m"),
     }
-    assert "1.4000 ± 0.0014 times what they were" in mismatch_sentence(moved, 1.0)
-    assert "times" not in mismatch_sentence(moved, 1.0, (), ["coulomb+", "inertia"])
+    gap = _derived(known)["gap"]
+    assert (float(gap.value), float(gap.standard_error)) == (0.003, 0.0002)
+    told = sentence("backlash", known | {"gap": gap}, 1.0, ())
+    assert "while a gap of 3.00 mm ± 0.40 mm is crossed" in told
+    most = gap._replace(standard_error=np.float64(0.002))
+    told = sentence("backlash", known | {"gap": most}, 1.0, ())
+    assert "a gap of at most 7 mm is crossed" in told
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "words"),
+    [
+        (1.88, 0.1, "by speed to the power of 1.88 ± 0.20;"),
+        (0.3, 0.3, "by speed to a power below one;"),
+        (0.5, 0.4, "by speed to a power other than one;"),
+    ],
+)
+def test_a_power_of_speed_is_told_by_what_is_known_of_it(value, error, words):
+    known = {"power_force": estimate(3.0, 0.1, "N"), "exponent": estimate(value, error, "1")}
+    assert words in sentence("viscous_nonlinearity", known, 0.1, ())
+
+
+def test_warming_of_which_only_the_change_is_known_is_told_by_that():
+    known = {
+        "thermal_viscous": estimate(8.0, 47.0, "N·s/m"),
+        "time_constant": estimate(180.0, 900.0, "s"),
+        "over_record": estimate(-2.2, 0.7, "N·s/m"),
+    }
+    told = sentence("thermal_drift", known, 0.12, ())
+    assert told.startswith(
+        "Viscous friction falls as the machine warms: by 2.2 N·s/m ± 1.4 N·s/m over the record; "
+        "where it settles, and how fast, this recording cannot tell;"
+    )
+    known["over_record"] = estimate(-2.2, 2.0, "N·s/m")
+    told = sentence("thermal_drift", known, 0.12, ())
+    assert told.startswith("Viscous friction drifts as the machine warms; where it settles,")
 
 
 @pytest.mark.parametrize(("period", "told"), [(0.006, "1/4 of the period of 24 mm"), (0.0057, "")])
@@ -261,7 +323,7 @@ def test_what_a_held_out_recording_holds_at_one_moment_is_told_with_that(monkeyp
         "filtered_holdout_force_error": {"after": 0.052},
         "filtered_holdout_refitted_error": 0.049,
     }
-    (remark,) = summary._elsewhere(fit, findings)
+    (remark,) = summary._elsewhere(fit, (), findings)
     assert ("most of that about t = 30.25 s" in remark.text) == bool(about)
     assert ("a filter of 0.5 s" in remark.text) == bool(about) and "acts there" in remark.text
 
@@ -283,3 +345,57 @@ def test_a_command_that_is_larger_is_told_as_a_force_constant_that_is_lower(more
     }
     said = sentence("position_dependent_force_constant", found, 0.9, ())
     assert f"it is {text} of the stroke and 33.33% ± 0.89% lower at the high end than" in said
+
+
+def held_out(**more):
+    """Figures of a held-out recording that other values of the same model fit."""
+    pair = {"before": 0.1, "after": 0.1}
+    return {
+        "force_error": pair,
+        "holdout_force_error": pair,
+        "filtered_force_error": {"before": 0.3, "after": 0.01},
+        "filtered_holdout_force_error": {"before": 0.1, "after": 0.1},
+        "filtered_holdout_refitted_error": 0.01,
+        "holdout_refitted_error": 0.03,
+        "holdout_noise_floor": 0.03,
+    } | more
+
+
+VALUES = {"coulomb-": {"here": 1.75, "there": 1.5, "standard_error": 0.04, "unit": "N·m"}}
+
+
+@pytest.mark.parametrize("name", ["thermal_drift", "gain_drift"])
+def test_what_begins_anew_in_each_recording_is_no_change_of_the_machine(name):
+    finding = Finding(name, "", "", (), "", {}, 0.9, None, 0.002)
+    fit = held_out(holdout_values=VALUES)
+    (remark,) = summary._elsewhere(fit, [finding])
+    spoken = name.replace("_", " ").capitalize()
+    assert f"other values hold there. {spoken} begins anew" in remark.text
+    assert "machine has changed" not in remark.text
+    said = wording.summary("explained", "gaussian", [finding], [], fit, [])
+    assert "coulomb- is 1.500 instead of 1.750 N·m. " in said and "begins anew" in said
+    assert "the machine changed" not in said
+    # Once is enough.
+    said = wording.summary("explained", "gaussian", [finding], [], fit, [remark.to_dict()])
+    assert "coulomb- is 1.500 instead of 1.750 N·m." in said and "begins anew" not in said
+    other = finding._replace(effect="cogging")
+    assert "The machine has changed" in summary._elsewhere(fit, [other])[0].text
+
+
+@pytest.mark.parametrize(("floor", "told"), [(0.03, True), (0.01, False)])
+def test_of_a_healthy_machine_it_is_said_whether_what_is_left_elsewhere_is_a_fault(floor, told):
+    fit = held_out(holdout_noise_floor=floor, holdout_values={})
+    said = wording.summary("consistent", "gaussian", [], [], fit, [])
+    assert ("no physics is missing there either" in said) == told
+    assert "does not determine the values" in said and "moves like" in said
+
+
+def test_a_law_that_acts_more_on_the_held_out_recording_may_lack_something_there():
+    finding = Finding("compliance", "", "", (), "", {}, 0.9, None, 0.002)
+    fit = held_out(filtered_holdout_refitted_error=0.09)
+    fit["filtered_holdout_force_error"] = {"before": 0.5, "after": 0.1}
+    (remark,) = summary._elsewhere(fit, [finding])
+    assert "compliance takes 49% of the force there and 30% here" in remark.text
+    assert remark.text.count("Explain that one") == 1
+    fit["filtered_holdout_force_error"] = {"before": 0.2, "after": 0.1}
+    assert "compliance" not in summary._elsewhere(fit, [finding])[0].text

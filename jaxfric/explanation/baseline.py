@@ -18,20 +18,25 @@ from .regression import Fit, fit
 class Baseline(NamedTuple):
     """A sum of terms, its name, and its parameters where it comes with values.
 
-    Of another recording also what it obeys, term by term, `fit`, and the standard errors of its
-    parameters, affine ones first, `(P,)`; `structured`, the coordinates over which it leaves
-    structure, and whether its residual is `rough`: neither is a difference. `start`: β from which
-    the sum is fitted, `(d,)`, where they are known.
+    Of another recording also what it obeys, term by term, `fit`, and the `covariance` of its
+    parameters, affine ones first, `(P, P)`, infinite where not visible; `structured`, the
+    coordinates over which it leaves structure, and whether its residual is `rough`: neither is a
+    difference. `start`: β from which the sum is fitted, `(d,)`, where they are known.
     """
 
     structure: AbstractTerm
     name: str
     model: Model | None = None
-    errors: np.ndarray | None = None
+    covariance: np.ndarray | None = None
     fit: Fit | None = None
     structured: frozenset[str] = frozenset()
     rough: bool = False
     start: np.ndarray | None = None
+
+    @property
+    def errors(self) -> np.ndarray | None:
+        """The standard errors of another recording's parameters, `(P,)`."""
+        return None if self.covariance is None else np.sqrt(np.diagonal(self.covariance))
 
 
 def baseline_of(given) -> Baseline:

@@ -1,5 +1,6 @@
 """What no axis does: inertia or friction that drives it, a force that has nothing to do with it."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,7 @@ import numpy as np
 from .. import terms as laws
 from ..checks import Remark
 from ..identification.uncertainty import Estimate
-from ..terms.base import summands
+from ..terms.base import AbstractTerm, summands
 from ..units import VELOCITY, spell
 from .evidence import Evidence
 from .intervals import spread
@@ -32,7 +33,7 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     a constant load, which terms that know the direction take up, cancels. The slower and the
     faster half each count, since a line through both may be negative where nothing moved.
     """
-    index = _friction(current)
+    index = friction_of(current.terms)
     if not index:
         return False
     known = spread(current, block)
@@ -52,10 +53,10 @@ def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
     return False
 
 
-def _friction(current: Fit) -> list[int]:
+def friction_of(terms: Sequence[AbstractTerm]) -> list[int]:
     """Indices, among all affine parameters, of friction as a function of velocity alone."""
     index, start = list[int](), 0
-    leaves = (leaf for term in current.terms for leaf in summands(term))
+    leaves = (leaf for term in terms for leaf in summands(term))
     for leaf in leaves:
         if leaf.coordinates == {"velocity"}:
             index += range(start, start + len(leaf.affine))

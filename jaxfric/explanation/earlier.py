@@ -14,6 +14,7 @@ from .acceptance import LINEARITY
 from .baseline import Baseline
 from .evidence import Evidence
 from .findings import Solution
+from .intervals import spread
 from .locate import locate
 from .mismatch import SURE, Mismatch
 from .predictions import PREDICTED, with_predictions
@@ -55,19 +56,11 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
         "holdout_force_error": None,
         "noise_floor": verification.noise(current, evidence.force),
     }
-    values = spelled.estimates(current, problem.block, recording.unit_names)
-    columns = [
-        [known[p.name].standard_error for p in (*term.affine, *term.nonlinear)]
-        for term, known in zip(current.terms, values, strict=True)
-    ]
-    counts = [len(term.affine) for term in current.terms]
-    affine = [e for own, count in zip(columns, counts, strict=True) for e in own[:count]]
-    searched = [e for own, count in zip(columns, counts, strict=True) for e in own[count:]]
     return Baseline(
         spelled.whole(current),
         f"recording {PurePath(recording.source).name}".rstrip(),
         spelled.model(current, recording.units),
-        np.asarray([*affine, *searched], float),
+        spread(current, problem.block).covariance,
         current,
         frozenset(each.coordinate for each in found),
         rough(errors, {}),

@@ -7,7 +7,9 @@ import numpy as np
 
 from ..data.recording import Recording
 from ..models import Model
+from ..terms.base import changed_columns
 from . import parameters as spelled, verification
+from .acceptance import LINEARITY
 from .baseline import at_values
 from .evidence import gather
 from .figures import Figures, cast
@@ -134,11 +136,18 @@ def _left_by(solution: Solution, again: Fit) -> float:
 
 
 def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:
-    """Values of the first term that are others on the held-out recording, here and there."""
+    """Values of the first term that are others on the held-out recording, here and there.
+
+    By more than both errors, and of forces that this recording would show with the values there: of
+    a bump that is narrower than its slowest row it says nothing, whatever it has in place of it.
+    """
     problem, held = solution.problem, solution.problem.held
     units = problem.evidence.motion.unit_names
     here = spelled.estimates(solution.selection.last, problem.block, units)[0]
     there = spelled.estimates(again, blocks(held.elapsed[held.centre], held.reach), units)[0]
+    term = again.terms[0]
+    names = [p.name for p in (*term.affine, *term.nonlinear)]
+    shown = dict(zip(names, _shown(solution, again), strict=True))
     return {
         name: {
             "here": float(own.value),
@@ -147,9 +156,22 @@ def _differing(solution: Solution, again: Fit) -> dict[str, dict[str, Any]]:
             "unit": own.unit,
         }
         for name, own in here.items()
-        if abs(own.value - there[name].value)
+        if shown.get(name, True)
+        and abs(own.value - there[name].value)
         > SURE * np.hypot(own.standard_error, there[name].standard_error)
     }
+
+
+def _shown(solution: Solution, again: Fit) -> list[bool]:
+    """Whether this recording's rows would show the force of each parameter of another fit's first
+    term, affine ones first: it is more than a sensor of force resolves.
+    """
+    evidence, last = solution.problem.evidence, solution.selection.last
+    term, beta = again.terms[0], again.betas[0]
+    columns = with_predictions(evidence, last).columns(term, beta[None])[0]
+    sizes = np.linalg.norm(columns * again.alphas[0], axis=0)
+    seen = sizes >= LINEARITY * np.linalg.norm(evidence.force)
+    return [*map(bool, seen), *(bool(np.any(seen[list(own)])) for own in changed_columns(term))]
 
 
 def _adjusted(findings: Findings) -> dict[str, list[str]]:

@@ -50,17 +50,19 @@ class Spread(NamedTuple):
         known = np.divide(trace**2, power, out=np.zeros_like(trace), where=power > 0)
         return np.maximum(known, LEAST_DEGREES)
 
-    def half_widths(self, weights: Float[np.ndarray, "K P"]) -> Float[np.ndarray, " K"]:
-        """Half the 95 % intervals of sums of parameters, `(K,)`; infinite where not visible."""
+    def errors(self, weights: Float[np.ndarray, "K P"]) -> Float[np.ndarray, " K"]:
+        """Standard errors of sums of parameters, `(K,)`; infinite where not visible."""
         weights = np.asarray(weights)
         seen = np.any(weights != 0, axis=0)
         if not np.isfinite(np.diagonal(self.covariance)[seen]).all():
             return np.full(len(weights), np.inf)
         matrix = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
-        errors = np.sqrt(np.maximum(np.sum(weights @ matrix * weights, axis=1), 0.0))
-        degrees = self.degrees_of_freedom(weights)
-        levels = [student_quantile(0.975, each) for each in degrees]
-        return np.asarray(levels) * errors
+        return np.sqrt(np.maximum(np.sum(weights @ matrix * weights, axis=1), 0.0))
+
+    def half_widths(self, weights: Float[np.ndarray, "K P"]) -> Float[np.ndarray, " K"]:
+        """Half the 95 % intervals of sums of parameters, `(K,)`; infinite where not visible."""
+        levels = [student_quantile(0.975, each) for each in self.degrees_of_freedom(weights)]
+        return np.asarray(levels) * self.errors(weights)
 
 
 def spread(current: Fit, block: np.ndarray) -> Spread:

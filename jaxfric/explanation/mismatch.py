@@ -25,7 +25,8 @@ class Mismatch(NamedTuple):
     terms found; `p_value`; `energy`: of the residual before, N²; `rivals`: effects that take as
     much with no more numbers, with none of these values wrong; `within`: numbers of those that move
     with the others, by no more than is uncertain; `instead`: to each that moved, what would do as
-    well.
+    well; `factor`: that of all affine values, where it says what moved by one number, but for those
+    that were `unknown` before, and whether one of `friction` alone does as well.
     """
 
     moved: dict[int, float]
@@ -35,6 +36,14 @@ class Mismatch(NamedTuple):
     within: frozenset[int] = frozenset()
     instead: dict[int, tuple[int, ...]] = {}  # noqa: RUF012 - a NamedTuple's default, never changed
     rivals: tuple[str, ...] = ()
+    factor: float | None = None
+    unknown: tuple[int, ...] = ()
+    friction: bool = False
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers are other ones."""
+        return len(self.moved) if self.factor is None else 1
 
 
 def mismatch(
@@ -50,7 +59,7 @@ def mismatch(
     which have to show them too.
     """
     given, first = as_given(model, refitted, evidence), at_values(model, evidence).energy
-    residual, own, beside = _apart(model, refitted, evidence)
+    residual, own, beside = apart(model, refitted, evidence)
     gained = given.energy - refitted.energy
     least = max(LEAST_SHARE * given.energy, LEAST_OF_BASE * first)
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
@@ -76,7 +85,7 @@ def mismatch(
     return Mismatch(moved, float(gained / first), p_value, given.energy, instead=instead)
 
 
-def _apart(
+def apart(
     model: Model, refitted: Fit, evidence: Evidence
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The residual at the values as given, and the parameters' columns and derivatives, both apart
@@ -101,7 +110,7 @@ def _lasting(
     smaller: the noise of the acceleration, which shifts an inertia, is much weaker there.
     """
     there = fit(refitted.terms, with_predictions(wide, refitted), refitted.betas, 0)
-    residual, own, _ = _apart(model, there, wide)
+    residual, own, _ = apart(model, there, wide)
     again = solve(own[:, free], residual)
     return [i for i, one, two in zip(free, shifts, again, strict=True)
             if two * np.sign(one) >= PERSISTS * abs(one)]  # fmt: skip

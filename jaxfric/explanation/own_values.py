@@ -5,6 +5,7 @@ from collections.abc import Callable
 from ..data.excerpt import MOST
 from . import parameters as spelled
 from .baseline import Baseline, at_values
+from .common_factor import put_right, with_factor
 from .earlier import changed
 from .findings import Findings
 from .holdout import measured
@@ -43,6 +44,8 @@ def _sure(
     """
     model = known.model
     if model is None or known.errors is not None or inputs.attributes:
+        return wrong
+    if wrong is not None and wrong.factor is not None:  # whose own interval leaves out one
         return wrong
     names = [p.name for p in (*model.term.affine, *model.term.nonlinear)]
     while wrong is not None and wrong.moved:
@@ -83,7 +86,8 @@ def _wrong(known: Baseline, findings: Findings, seed: int) -> Mismatch | None:
         return None
     problem, selection = findings.undelayed
     wrong = mismatch(known.model, selection.last, problem.evidence, problem.wide, seed)
-    if wrong is None or known.errors is None:
+    wrong = None if wrong is None else with_factor(known, findings.undelayed, wrong)
+    if wrong is None or wrong.factor is not None or known.errors is None:
         return wrong
     units = problem.evidence.motion.unit_names
     here = spelled.estimates(selection.last, problem.block, units)[0]
@@ -97,7 +101,8 @@ def improved_model(
     """The findings beside the baseline's values as given or refitted, where the model is better."""
     fixed = inputs.fixed and not findings.selection.trusted
     if known.model is not None and (wrong is not None or fixed):
-        findings = at_given(known.model, findings, () if wrong is None else tuple(wrong.moved))
+        model, free = put_right(known.model, wrong)
+        findings = at_given(model, findings, free)
     first = findings.selection.base
     if wrong is not None:
         first = at_values(known.model, findings.problem.evidence)

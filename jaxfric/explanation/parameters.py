@@ -10,10 +10,12 @@ from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..terms.base import AbstractTerm, Sum, summands
 from ..terms.effects import Wave, wave
+from ..terms.sample import Scales
 from ..units import spell
 from .intervals import spread
 from .regression import Fit
 from .significance import BLOCKS
+from .slow_changes import along, over_record
 
 
 def whole(current: Fit) -> AbstractTerm:
@@ -31,8 +33,12 @@ def model(current: Fit, units, taken_later: float = 0.0) -> Model:
     return known.with_force_delay(-taken_later) if taken_later else known
 
 
-def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[dict[str, Estimate]]:
-    """The parameters of each term of a fit, waves by amplitude and phase too."""
+def estimates(
+    current: Fit, block: np.ndarray, units: dict[str, str], limits: Scales | None = None
+) -> list[dict[str, Estimate]]:
+    """The parameters of each term of a fit, waves by amplitude and phase too; with the `limits` of
+    the recording what changes slowly by how much it changes as well.
+    """
     known = spread(current, block)
     matrix, freedom = known.covariance, known.degrees_of_freedom(np.eye(len(known.covariance)))
     result = []
@@ -48,7 +54,11 @@ def estimates(current: Fit, block: np.ndarray, units: dict[str, str]) -> list[di
             )
             for p, value, i in zip((*term.affine, *term.nonlinear), values, index, strict=True)
         }
-        result.append(plain | _waves(term, values, matrix[np.ix_(index, index)], plain))
+        found = plain | _waves(term, values, matrix[np.ix_(index, index)], plain)
+        if limits is not None and n:
+            found |= along(current, n, known, units, limits)
+            found |= over_record(current, n, known, units, limits)
+        result.append(found)
     return result
 
 
@@ -141,7 +151,9 @@ def _widened(
     """
 
     def both(name: str, own: Estimate) -> Estimate:
-        there = theirs[name]
+        there = theirs.get(name)
+        if there is None:  # a wave that repeats by those, say
+            return own
         apart = float(there.value - own.value)
         if name.startswith("phase") or name.endswith("_phase"):
             apart = float(np.angle(np.exp(1j * apart)))

@@ -8,6 +8,7 @@ from ..models import Model
 from ..terms.effects.parameter_mismatch import MISMATCH
 from .acceptance import LINEARITY, accepted
 from .baseline import as_given
+from .common_factor import put_right
 from .contest import RIVAL, Contest, Finalist, contest
 from .evidence import Evidence
 from .findings import Findings, Solution, alone
@@ -42,9 +43,9 @@ def instead(
     beside = _beside(model, findings, wrong, seed)
     names = (f.effect.name for f in beside.round_.finalists if f.effect.name != MISMATCH)
     rivals = tuple(dict.fromkeys(names))
-    if len(wrong.moved) == 1:
+    if wrong.numbers == 1:
         return None, rivals
-    return _one(model, findings, beside, len(wrong.moved)), rivals
+    return _one(model, findings, beside, wrong.numbers), rivals
 
 
 def _beside(model: Model, findings: Findings, wrong: Mismatch, seed: int) -> _Beside:
@@ -53,7 +54,8 @@ def _beside(model: Model, findings: Findings, wrong: Mismatch, seed: int) -> _Be
     By odds of no more than those between rivals, or but for what no sensor of force resolves.
     """
     problem, selection = findings.recorded
-    values = as_given(model, selection.base, problem.evidence, tuple(wrong.moved))
+    right, free = put_right(model, wrong)
+    values = as_given(right, selection.base, problem.evidence, free)
     given = freed(as_given(model, selection.base, problem.evidence), ())
     evidence = with_predictions(problem.evidence, given)
     round_ = contest(evidence, given, problem.candidate_set, seed, lambda e: not e.momentary)
@@ -67,7 +69,7 @@ def _beside(model: Model, findings: Findings, wrong: Mismatch, seed: int) -> _Be
         odds = 0.5 * round_.size * np.log(each.energy / max(values.energy, 1e-300))
         return odds < RIVAL or each.energy - values.energy < floor
 
-    most = len(wrong.moved)
+    most = wrong.numbers
     tried = [f for f in round_.finalists if f.p_value <= LEVEL and _numbers(f) <= most]
     finalists = [each for each in map(beside, tried) if as_well(each)]
     round_ = constrained(round_._replace(finalists=finalists), given, evidence)

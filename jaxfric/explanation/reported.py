@@ -13,6 +13,7 @@ from ..units import spell
 from . import parameters as spelled, verification
 from .acceptance import OF_BASE
 from .baseline import Baseline
+from .common_factor import FACTOR, factor_of
 from .dates import dated, spanning
 from .evidence import Evidence
 from .finding import Finding, Moved
@@ -22,7 +23,8 @@ from .mismatch import Mismatch
 from .quantities import quantity, rise
 from .regression import Fit
 from .selection import SelectedTerm
-from .sentences import changed_sentence, mismatch_sentence, sentence, spoken
+from .sentences import changed_sentence, factor_sentence, mismatch_sentence, sentence, spoken
+from .slow_changes import slow, together
 from .uncertainty import estimated
 from .verdict import overlapping
 
@@ -69,6 +71,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
         rivals = *selected.rivals, *map(spoken, selected.instead)
         text = sentence(effect.name, parameters, share, rivals, extent, together)
         text += _overtone(effect, parameters, result)
+        text += _told_with(findings, number, extent)
         if rest:
             text += REST
         if selected.rephased:
@@ -159,15 +162,27 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
             moved[names[i]] = Moved(before, current, float(errors[i]))
     first = better.first
     held_share = None if held is None else verification.share(first, base, first, held)
-    kept = [names[i] for i, value in enumerate(base.alphas[0]) if value and i not in wrong.moved]
-    text = mismatch_sentence(moved, wrong.share, wrong.rivals, kept)
-    if known.fit is not None:
-        other = known.name.removeprefix("recording ")
-        text = changed_sentence(moved, wrong.share, other, wrong.rivals)
+    other = None if known.fit is None else known.name.removeprefix("recording ")
+    if wrong.factor is not None:
+        factor = factor_of(known, better.findings.undelayed)
+        told = factor_sentence(factor, wrong.share, other, wrong.friction, wrong.rivals)
+        # Each value is that many times what it was, as well known as the factor is.
+        moved = {FACTOR: Moved(1.0, factor)} | {
+            name: m._replace(estimate=factor._replace(
+                value=m.before * factor.value,
+                standard_error=abs(m.before) * factor.standard_error,
+                unit=m.unit,
+            ))
+            for name, m in moved.items()
+        }  # fmt: skip
+    elif other is not None:
+        told = changed_sentence(moved, wrong.share, other, wrong.rivals)
+    else:
+        told = mismatch_sentence(moved, wrong.share, wrong.rivals)
     separate_by = " ".join(dict.fromkeys(EFFECTS[rival].separate_by for rival in wrong.rivals))
     instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(
-        MISMATCH, PARAMETER_MISMATCH.equation, text, wrong.rivals, separate_by, moved,
+        MISMATCH, PARAMETER_MISMATCH.equation, told, wrong.rivals, separate_by, moved,
         wrong.share, held_share, wrong.p_value, instead=instead,
     )  # fmt: skip
 
@@ -186,6 +201,22 @@ def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Find
                 part = f"1/{round(ratio)} of the period of {whole}"
                 return f" That is {part}: a harmonic of the same cause."
     return ""
+
+
+def _told_with(findings: Findings, number: int, extent: Extent) -> str:
+    """That the values along the stroke are those of several findings together, in words."""
+    _, selection = findings.examined_in(number)
+    current, index = selection.last, selection.term_index(number)
+    stroke = extent.low, extent.high
+    if not slow(current.terms[index], current.betas[index], stroke):
+        return ""
+    first = selection.term_index(0)
+    others = [
+        selection.selected[n - first].effect.name.replace("_", " ")
+        for n in together(current, index, stroke)
+        if n != index
+    ]
+    return f" These values along the stroke are with {' and '.join(others)}." if others else ""
 
 
 def _twins(findings: Findings, number: int) -> list[int]:

@@ -4,13 +4,12 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
 from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
+from ..terms.slow import CHANGES
 from ..units import FORCE
 from .quantities import UNSEEN, nil, quantity, turns
 
@@ -41,14 +40,20 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     values = {
         n: math.inf if n in effect.periods and _unseen(estimate) else float(estimate.value)
         for n, estimate in parameters.items()
+        if not (n in CHANGES and nil(estimate))
     }
-    template = effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
+    vague = effect.vague(values, extent) if _sizeless(effect, parameters) else None
+    template = (
+        vague or effect.variant(values, extent) or effect.sentence or effect.name.replace("_", " ")
+    )
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     if _beyond(effect, parameters, extent.force):
         words["amplitude"] = UNSEEN
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
     sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
     words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
+    words |= {f"{n}:power": _as_power(estimate) for n, estimate in parameters.items()}
+    words |= {f"{n}:more": _more(estimate) for n, estimate in parameters.items()}
     # Names may be a simulator's, of any characters.
     return re.sub(r"\{([^{}]*)\}", lambda m: words.get(m[1], "an unknown amount"), template)
 
@@ -89,6 +94,12 @@ def _unseen(estimate: Estimate) -> bool:
     return nil(estimate) or math.isinf(float(estimate.standard_error))
 
 
+def _sizeless(effect: Effect, parameters: Mapping[str, Estimate]) -> bool:
+    """Whether all that its force is proportional to may be nil."""
+    names = {p.name for term in effect.shapes(ANY) for p in term.affine}
+    return all(_unseen(estimate) for name, estimate in parameters.items() if name in names)
+
+
 def _beyond(effect: Effect, parameters: Mapping[str, Estimate], force: float) -> bool:
     """Whether the most that a force's amplitude may be is more than the usual force, N: waves that
     nearly cancel have any amplitude together, and such a bound is none.
@@ -112,13 +123,24 @@ def _as_gain(more: Estimate) -> str:
     return f"{size}{spread} {'higher' if gain > 0 else 'lower'}"
 
 
-def mismatch_sentence(
-    moved, share: float, rivals: Sequence[str] = (), kept: Sequence[str] = ()
-) -> str:
-    """Wrong values of the baseline as a sentence; `kept`: names of forces that are right.
+def _as_power(exponent: Estimate) -> str:
+    """An exponent in words, or on which side of proportion it is."""
+    if not _unseen(exponent):
+        return f"to the power of {quantity(exponent)}"
+    low, high = map(float, exponent.interval())
+    if high < 1:
+        return "to a power below one"
+    return "to a power above one" if low > 1 else "to a power other than one"
 
-    A force that is counted otherwise would change these as well.
-    """
+
+def _more(estimate: Estimate) -> str:
+    """A difference in words: "1.50 N ± 0.20 N less"."""
+    size = quantity(estimate._replace(value=abs(estimate.value)))
+    return f"{size} {'more' if estimate.value > 0 else 'less'}"
+
+
+def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
+    """Wrong values of the baseline as a sentence."""
     parts = []
     for name, m in moved.items():
         if name == GAIN and not m.before:
@@ -128,33 +150,8 @@ def mismatch_sentence(
         else:
             value = quantity(m.estimate._replace(value=abs(m.value)))
             parts.append(f"{_spoken(name)} is {value} {'more' if m.value > 0 else 'less'}")
-    alike = "" if kept else _alike(moved)
-    text = f"Wrong values: {'; '.join(parts)}{alike}; {unexplained(share)}"
+    text = f"Wrong values: {'; '.join(parts)}; {unexplained(share)}"
     return f"{text}{indistinct(rivals)}."
-
-
-# A common factor says something where its error is a quarter of its distance from one.
-KNOWN_FACTOR = 0.25
-
-
-def _alike(moved) -> str:
-    """Whether all values differ by one factor, as of a force that is counted otherwise."""
-    if len(moved) < 2 or not all(m.before for m in moved.values()):
-        return ""
-    factors = np.array([float(m.value) / m.before for m in moved.values()])
-    halves = np.array([float(m.estimate.half_width()) / abs(m.before) for m in moved.values()])
-    if not np.all((halves > 0) & np.isfinite(halves)):
-        return ""
-    weights = halves**-2 / np.sum(halves**-2)
-    factor, half = float(weights @ factors), float(np.sum(halves**-2) ** -0.5)
-    apart, unknown = np.abs(factors - factor) > halves, halves > abs(factor - 1)
-    if np.any(apart | unknown) or half > KNOWN_FACTOR * abs(factor - 1):
-        return ""
-    digits = max(0, 1 - math.floor(math.log10(half)))
-    return (
-        f"; all of them {factor:.{digits}f} ± {half:.{digits}f} times what they were, as where the "
-        "recorded force (the torque constant, a unit) is that many times the model's"
-    )
 
 
 def _times(factor: Estimate) -> str:
@@ -206,6 +203,26 @@ def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()
     text = text[:1].upper() + text[1:]
     text = f"{text} since {other or 'the other recording'}; {share:.0%} of the difference"
     return f"{text}{indistinct(rivals)}."
+
+
+def factor_sentence(
+    factor: Estimate, share: float, other: str | None = None, friction: bool = False,
+    rivals: Sequence[str] = (),
+) -> str:  # fmt: skip
+    """That all forces are so many times what they were; `other`: of which recording, `None` of a
+    model; `friction`: whether friction alone does as well.
+    """
+    gain = _as_gain(factor._replace(value=factor.value - 1))
+    alone = (
+        ", or friction alone is so many times what it was, which the accelerations here do not tell"
+    )
+    whose = "the model's" if other is None else f"those of {other or 'the other recording'}"
+    text = (
+        f"One factor for all values: the forces are {quantity(factor)} times {whose}, as where "
+        f"the gain (the torque or force constant) is {gain}{alone * friction}"
+    )
+    part = unexplained(share) if other is None else f"{share:.0%} of the difference"
+    return f"{text}; {part}{indistinct(rivals)}."
 
 
 def _spoken(name: str) -> str:

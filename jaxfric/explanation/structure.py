@@ -137,7 +137,7 @@ def with_findings(
             "share": finding.share,
             "size": float(np.sqrt(power)),
             "p_value": finding.p_value,
-            "detail": f"where {finding.effect.replace('_', ' ')} acts",
+            "detail": f"by {finding.effect.replace('_', ' ')}",
         }
         where = [*where, each]
     return where

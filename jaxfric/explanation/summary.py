@@ -27,7 +27,15 @@ from .reported import NO_POSITION, not_confirmed, reported, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
-from .wording import CONSTANT_APART, ELSEWHERE, HOLDS_MORE, HOLDS_OTHER, OTHER, constant_apart
+from .wording import (
+    CONSTANT_APART,
+    ELSEWHERE,
+    HOLDS_MORE,
+    HOLDS_OTHER,
+    OTHER,
+    begins_anew,
+    constant_apart,
+)
 
 
 def summarise(
@@ -62,7 +70,7 @@ def summarise(
         remarks = [*remarks, *_doubts(better)]
     tone = tone_left(better.findings, figures)
     errors = document(better, filtered, models[1], figures, tone)
-    apart = _elsewhere(errors, better.findings)
+    apart = _elsewhere(errors, effects, better.findings)
     remarks = [*remarks, *apart]
     tones = []
     if tone is not None:
@@ -185,12 +193,14 @@ def _doubts(better: Improved) -> list[Remark]:
     return remarks
 
 
-def _elsewhere(errors: Mapping[str, Any], findings: Findings | None = None) -> list[Remark]:
+def _elsewhere(
+    errors: Mapping[str, Any], findings: Sequence[Finding] = (), found: Findings | None = None
+) -> list[Remark]:
     """That the held-out recording obeys other values of the same model, or holds something that no
     values account for and that is not here, where that matters.
 
     Less is told in the summary alone. What is left at one moment may be of a motion that is too
-    quick there for the kernel: with the `findings` that is said.
+    quick there for the kernel: with what was `found` that is said.
     """
     here, held = errors["filtered_force_error"], errors["filtered_holdout_force_error"]
     refitted = errors["filtered_holdout_refitted_error"]
@@ -205,13 +215,15 @@ def _elsewhere(errors: Mapping[str, Any], findings: Findings | None = None) -> l
             f"values, and this one with {here['after']:.1%}: "
         )
         acts = "something acts there that does not act here, or not as much"
-        about = None if findings is None else brief(findings)
-        if about is not None:
-            reach = findings.problem.evidence.reach
-            text += f"most of that about t = {about:.4g} s. Either {acts}, or the motion is too "
-            text += f"quick there for a filter of {reach:.2g} s, as this log needs"
-        else:
+        acts = _acts_more(here, held, findings) + acts
+        about = None if found is None else brief(found)
+        if about is None or found is None:
             text += acts
+        else:
+            text += (
+                f"most of that about t = {about:.4g} s. Either {acts}, or the motion is too quick "
+                f"there for a filter of {found.problem.evidence.reach:.2g} s, as this log needs"
+            )
         text += ". Explain that one, with this one held out."
         return [Remark(HOLDS_MORE, text, False)]
     text = (
@@ -225,12 +237,33 @@ def _elsewhere(errors: Mapping[str, Any], findings: Findings | None = None) -> l
             "it is of another axis, in other units or of another sign, or this recording does not "
             "determine the values that hold there."
         )
+    elif anew := begins_anew(findings):
+        text += f"other values hold there. {anew}"
     else:
         text += (
             "other values hold there. The machine has changed, or this recording does not "
             "determine them: identify on one that moves like both."
         )
     return [Remark(HOLDS_OTHER, text, False)]
+
+
+def _acts_more(
+    here: Mapping[str, float], held: Mapping[str, float], findings: Sequence[Finding]
+) -> str:
+    """That what was found makes a larger part of the held-out force than here, so that what its law
+    lacks shows there, the beginning of a sentence; empty where it does not.
+    """
+    names = [f.effect.replace("_", " ") for f in findings if not EFFECTS[f.effect].momentary]
+    if not names:
+        return ""
+    parts = [max(e["before"] ** 2 - e["after"] ** 2, 0.0) ** 0.5 for e in (here, held)]
+    if not parts[1] > parts[0]:
+        return ""
+    what = " and ".join(dict.fromkeys(names))
+    return (
+        f"{what} takes {parts[1]:.0%} of the force there and {parts[0]:.0%} here, and what its law "
+        "as found here lacks shows there, or "
+    )
 
 
 def _not_visible(selection: Selection, units, absent: Sequence[str]) -> list[dict[str, Any]]:

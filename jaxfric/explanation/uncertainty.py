@@ -8,6 +8,7 @@ import numpy as np
 
 from ..identification.uncertainty import Estimate
 from ..terms.effects import traits
+from ..terms.sample import Scales
 from . import parameters as spelled, verification
 from .baseline import refitted
 from .evidence import Evidence
@@ -67,7 +68,8 @@ def by_rows(
         current = refitted(evidence, known, others.given, others.free, steps)
         return asked(current), evenly(len(evidence.rows), int(problem.block[-1]) + 1)
 
-    ours = _with_structure(asked(selection.last), rows.block, units)
+    limits = rows.evidence.limits
+    ours = _with_structure(asked(selection.last), rows.block, units, limits)
     delayed = traits(selection.last.terms[-1]).late
     problem, others = findings.undelayed if delayed else findings.recorded
     count = len(others.last.terms)
@@ -81,7 +83,7 @@ def by_rows(
     wide: list[dict[str, Estimate] | None] = []
     if problem.wide is not None:
         current, block = again(problem.wide, others.last)
-        values = spelled.estimates(current, block, units)
+        values = spelled.estimates(current, block, units, limits)
         forces = [_sizes(each) for each in (current, others.last)]
         pairs = zip(values, *forces, strict=True)
         wide = [own if through >= PASSES * all_of_it else None for own, through, all_of_it in pairs]
@@ -91,7 +93,7 @@ def by_rows(
         # but an axis that warms does so there as well, and without that its friction is another.
         lasting = verification.lasting(others.last, others.rephased).terms
         known = others.last.only([n for n in range(count) if n not in others.rephased])
-        values = spelled.estimates(*again(problem.held, known), units)
+        values = spelled.estimates(*again(problem.held, known), units, limits)
         pairs_there = zip(known.terms, values, strict=True)
         there = {id(t): each for t, each in pairs_there if any(t is term for term in lasting)}
     both = zip_longest(ours[:count], wide, map(there.get, map(id, others.last.terms)))
@@ -99,7 +101,7 @@ def by_rows(
 
 
 def _with_structure(
-    current: Fit, block: np.ndarray, units: dict[str, str]
+    current: Fit, block: np.ndarray, units: dict[str, str], limits: Scales
 ) -> list[dict[str, Estimate]]:
     """The parameters of each term; of a load that is stepped along the motion with errors that
     contain what is left beside the noise, were all of it theirs.
@@ -108,7 +110,7 @@ def _with_structure(
     machine (another part of the friction, a blow that is not straight between two samples) moves it
     from one to the next, which no block and no width of the kernel tells.
     """
-    found = spelled.estimates(current, block, units)
+    found = spelled.estimates(current, block, units, limits)
     stepped = [number for number, term in enumerate(current.terms) if term.stepped]
     if not stepped:
         return found

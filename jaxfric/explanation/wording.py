@@ -62,7 +62,8 @@ def summary(
     whole = [*severe, said, *other, *refuted, errors]
     told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
     more = [] if told else _more_there(fit, verdict)
-    return " ".join([*whole, *(_not_determined(fit) or _of_a_moment(findings, fit) or more)])
+    elsewhere = _not_determined(fit, verdict, findings, told)
+    return " ".join([*whole, *(elsewhere or _of_a_moment(findings, fit) or more)])
 
 
 def _not_confirmed(findings: Sequence[Finding]) -> str:
@@ -157,8 +158,12 @@ def _found_of(fit: Mapping[str, Any]) -> float:
     return math.sqrt(max(errors["before"] ** 2 - errors["after"] ** 2, 0.0))
 
 
-def _not_determined(fit: Mapping[str, Any]) -> list[str]:
-    """That other values hold on the held-out recording, or none that this one determines."""
+def _not_determined(
+    fit: Mapping[str, Any], verdict: str, findings: Sequence[Finding], warned: bool
+) -> list[str]:
+    """That other values hold on the held-out recording, or none that this one determines, whether
+    that is a fault of the model, and what to do. `warned`: whether a warning says why.
+    """
     refitted = fit.get("filtered_holdout_refitted_error")
     if refitted is None or fit["filtered_holdout_force_error"]["after"] <= ELSEWHERE * refitted:
         return []
@@ -173,16 +178,46 @@ def _not_determined(fit: Mapping[str, Any]) -> list[str]:
     )
     if constant := constant_apart(fit):
         return [f"{text}there a constant force of {constant} more acts. {CONSTANT_APART}"]
-    if values := fit.get("holdout_values"):
-        there = ", ".join(_differs(name, **value) for name, value in values.items())
+    values = ", ".join(
+        _differs(name, **value) for name, value in (fit.get("holdout_values") or {}).items()
+    )
+    if anew := begins_anew(findings):
+        return [f"{text}there {values or 'other values hold'}.{'' if warned else f' {anew}'}"]
+    if values:
         return [
-            f"{text}there {there}. Either the machine changed in between, or no model of this kind "
-            "holds for both motions."
+            f"{text}there {values}. Either the machine changed in between, or no model of this "
+            "kind holds for both motions."
+        ]
+    if verdict == "consistent" and _noise_there(fit):
+        return [
+            f"{text}no physics is missing there either, but this recording does not determine the "
+            "values that hold there. That matters only where they are used for such a motion: then "
+            "identify on one that moves like it."
         ]
     return [
         f"{text}this recording does not determine the values that hold there. Identify on one that "
         "moves like both."
     ]
+
+
+def _noise_there(fit: Mapping[str, Any]) -> bool:
+    """Whether the model leaves no more than noise of the held-out recording with values of its own:
+    less than `ELSEWHERE` times what noise alone makes there.
+    """
+    left, floor = fit.get("holdout_refitted_error"), fit.get("holdout_noise_floor")
+    return left is not None and floor is not None and left < ELSEWHERE * floor
+
+
+def begins_anew(findings: Sequence[Finding]) -> str:
+    """That what was found begins anew in each recording, a sentence; empty where none does."""
+    names = [f.effect.replace("_", " ") for f in findings if EFFECTS[f.effect].settles]
+    if not names:
+        return ""
+    return (
+        f"{' and '.join(dict.fromkeys(names)).capitalize()} begins anew in each recording and "
+        "depends on how the axis has moved, so that the held-out one need not have the same: that "
+        "shows no other change of the machine. Record both warm, or explain that one by itself."
+    )
 
 
 CONSTANT_APART = "A weight, a tilt or a zero of the sensor changes so, and a load that wanders."

@@ -152,11 +152,6 @@ REPEATED = 1.5
 RECURS = 2.0
 
 
-def slowly(period: str, text: str) -> Callable[[Mapping[str, float], Extent], str | None]:
-    """Another sentence, `text`, where a wave does not repeat within the stroke."""
-    return lambda values, extent: text if values[period] * REPEATED > extent.stroke else None
-
-
 def with_parameter(name: str, text: str) -> Callable[[Mapping[str, float], Extent], str | None]:
     """Another sentence, `text`, for a law that has the parameter `name`."""
     return lambda values, extent: text if name in values else None
@@ -253,7 +248,9 @@ class Effect:
       sentence where the name promises more than the values hold. `sizes`: parameters of which only
       the most is known where other terms could stand in for all of it. `moment`: the parameter that
       dates it; `lasting`: that by which it is over again. `dates`: times, s, that a term holds as
-      given numbers, by name. `derived`: values that follow from its parameters, by name.
+      given numbers, by name. `derived`: values that follow from its parameters, by name. `settles`:
+      the time constant with which it dies out from the start of the record. `vague`: another
+      sentence where its size may be nil with all shapes that it may have, though it acts.
 
     - `drawn`: whether `prove` conceals it: by physics of its own in the simulator of `prove`, or
       else by its law.
@@ -302,6 +299,8 @@ class Effect:
     lasting: str = ""
     dates: Callable[[Any], dict[str, float]] = _no_dates
     derived: Callable[[Mapping[str, float], Extent], dict[str, Derived]] = _none_derived
+    settles: str = ""
+    vague: Callable[[Mapping[str, float], Extent], str | None] = _no_variant
     drawn: bool = True
 
     def __post_init__(self) -> None:

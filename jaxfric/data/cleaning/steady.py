@@ -12,6 +12,11 @@ NEAR_STAMPS = 32
 CLEAR = 7.0
 # A stamp that is rounded by 1 % of a step puts as much error on a derived velocity.
 FINE = 0.01
+# A line through rounded stamps is off by up to this part of the last digit at either end.
+OFF = 0.125
+# A stamp that is moved by a few samples is rounded to several. Beyond that a clock that stops and
+# catches up between two stamps that differ, as one of a busy computer does, does not show.
+FEW_STEPS = 3.0
 # Late by less than a thousandth of a step changes a velocity by less than that: no repair.
 NEGLIGIBLE = 0.001
 # Stamps further out than a million normal ones ever are: perhaps the clock itself was late there.
@@ -34,11 +39,17 @@ def on_a_steady_clock(signals, segment: np.ndarray, notes: list[str]) -> np.ndar
         parts = [part for part in parts if part.start not in done]
         usual = float(np.median(np.diff(time)))
         if moved > NEGLIGIBLE * usual:
-            notes.append(
+            note = (
                 "The time stamps are rounded, and agree to their last digit with a steady clock "
                 f"of {1 / usual:.6g} Hz; that clock is used, which moves them by up to "
                 f"{moved:.3g} s."
             )
+            if moved > FEW_STEPS * usual:
+                note = (
+                    f"Warning: {note} That is {moved / usual:.0f} samples, between which nothing "
+                    "shows whether the clock was steady: log the time with more digits."
+                )
+            notes.append(note)
     return _stamped_late(signals, time, segment, parts, notes)
 
 
@@ -59,6 +70,9 @@ def _unrounded(time: np.ndarray) -> np.ndarray | None:
         return None
     digit = float(step[step > 0].min())
     if digit < FINE * float(np.mean(step)):
+        return None
+    # Of a clock whose rate is known no better than that each velocity is off by as much.
+    if 2 * OFF * digit > FINE * float(np.ptp(time)):
         return None
     if np.max(np.abs(step - digit * np.rint(step / digit))) > error + 1e-6 * digit:
         return None
@@ -96,8 +110,7 @@ def _reach(time: np.ndarray, start: int, digit: float) -> int | None:
 
     def fits(stop):
         part = time[start:stop]
-        # A line fitted to few stamps is off by up to an eighth of the last digit at either end.
-        return np.ptp(part - _straight(part)) <= 1.25 * digit
+        return np.ptp(part - _straight(part)) <= (1 + 2 * OFF) * digit
 
     total = len(time)
     if fits(total):

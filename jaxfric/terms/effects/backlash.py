@@ -1,5 +1,6 @@
 """A gap between motor and load."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax
@@ -10,7 +11,7 @@ from jaxtyping import Array, Float
 from ...data.recording import Recording
 from ...units import FORCE, POSITION, VELOCITY
 from ..base import AbstractTerm
-from ..effect import Effect, View, even, inside, product, scattered, with_parameter
+from ..effect import Derived, Effect, Extent, View, even, inside, product, scattered, with_parameter
 from ..presliding import AbstractStates, States, starts
 from ..sample import UNKNOWN, Burden, Parameter, Resolution
 from ..transmission import (
@@ -257,12 +258,17 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     return np.clip(found, *ends)
 
 
+def _whole(values: Mapping[str, float], extent: Extent) -> dict[str, Derived]:
+    """The gap from flank to flank."""
+    return {"gap": Derived("half_gap", 2.0, POSITION)}
+
+
 BACKLASH = Effect(
     "backlash",
     "−F_L sign(v) inside the gap 2δ, or F_L (T − sign v) − M_L a, T what the flanks push",
     "reversals",
-    "After a reversal {backlash_force} of friction is absent while a gap of twice {half_gap} is "
-    "crossed: backlash",
+    "After a reversal {backlash_force} of friction is absent while a gap of {gap} is crossed: "
+    "backlash",
     laws=(Backlash, DampedBacklash),
     coordinates=("distance_since_reversal",),
     needs=frozenset({"position"}),
@@ -278,10 +284,11 @@ BACKLASH = Effect(
     scatter=flights,
     variant=with_parameter(
         "load_deceleration",
-        "A load with {backlash_force} of friction crosses a gap of twice {half_gap}, whose flanks "
+        "A load with {backlash_force} of friction crosses a gap of {gap}, whose flanks "
         "give way by {windup} under that friction, after a reversal, and where the motor brakes "
         "harder than the load slows down by itself, by {load_deceleration}: backlash",
     ),
-    sizes=("backlash_force",),
+    sizes=("backlash_force", "gap"),
+    derived=_whole,
     vanishes=("half_gap",),
 )

@@ -10,9 +10,10 @@ from jaxtyping import Array, Float
 from ...units import DIMENSIONLESS, FORCE, POSITION
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
-from ..effect import Effect, Extent, Waves, slowly
+from ..effect import Effect, Extent, Waves
 from ..position import POSITION_ONLY, cycles, shortest, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
+from ..slow import slowly
 from ..table import reading
 
 # A pitch is one that is seen to repeat: a whole period and a quarter in the stroke. What does not
@@ -84,7 +85,8 @@ def _over_position(term: Cogging | ForceRipple) -> Waves:
 
 _slowly = slowly(
     "pitch",
-    "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the stroke",
+    "A force varies slowly along the stroke",
+    "; it does not repeat within the stroke",
 )
 
 

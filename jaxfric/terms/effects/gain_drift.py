@@ -60,6 +60,7 @@ GAIN_DRIFT = Effect(
     separate_by="Press on a force gauge with one command, at rest, cold and again warm: friction "
     "of the axis does not show there.",
     momentary=True,
+    settles="time_constant",
     composite=True,
     drawn=False,
 )

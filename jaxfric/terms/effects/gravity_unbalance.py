@@ -8,9 +8,10 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import REPEATED, Effect, Extent, slowly
+from ..effect import REPEATED, Effect, Extent
 from ..position import POSITION_ONLY, Gravity, stroke, wave, waves
 from ..sample import UNKNOWN, Parameter, Resolution, Sample
+from ..slow import slowly
 
 # Of so many strokes a sine spans ±π/8 about its middle and differs from a parabola by
 # (π/8)³/6 = 1 %: a longer period can no longer be told.
@@ -67,8 +68,8 @@ def _told(values: Mapping[str, float], extent: Extent) -> str | None:
 
 _slowly = slowly(
     "unbalance_period",
-    "A force varies slowly along the stroke, by {amplitude}: it does not repeat within the "
-    "stroke, so that a spring or a cable would look the same",
+    "A force varies slowly along the stroke",
+    "; it does not repeat within the stroke, so that a spring or a cable would look the same",
 )
 
 GRAVITY_UNBALANCE = Effect(

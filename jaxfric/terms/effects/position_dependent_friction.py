@@ -7,9 +7,10 @@ from jaxtyping import Array, Float
 
 from ...units import FORCE, POSITION
 from ..base import AbstractLaw
-from ..effect import SIDE, Effect, Waves, slowly
+from ..effect import SIDE, Effect, Waves
 from ..position import WITH_DIRECTION, any_period, cycles, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
+from ..slow import slowly
 
 
 class PositionDependentFriction(AbstractLaw):
@@ -47,7 +48,8 @@ POSITION_DEPENDENT_FRICTION = Effect(
     waves=lambda term: Waves("position", True, SIDE),
     variant=slowly(
         "friction_period",
-        "Friction varies slowly along the stroke, by {amplitude}: it does not repeat within the "
-        "stroke, as with a guide or a belt that is tight in one place",
+        "Friction varies slowly along the stroke",
+        "; it does not repeat within the stroke, as with a guide or a belt that is tight in one "
+        "place",
     ),
 )

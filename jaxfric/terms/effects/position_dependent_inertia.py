@@ -8,9 +8,10 @@ from jaxtyping import Array, Float
 
 from ...units import INERTIA, POSITION
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import Effect, View, slowly
+from ..effect import Effect, View
 from ..position import any_period, cycles, wave, waves
 from ..sample import UNKNOWN, Parameter, Sample
+from ..slow import slowly
 from ..text import TURN, literal
 
 
@@ -63,5 +64,5 @@ POSITION_DEPENDENT_INERTIA = Effect(
     separate_by="Cross the stroke at two accelerations: a weight does not scale with them. A "
     "position that is off once a turn, by an encoder off centre, does: compare a second sensor.",
     grid=periods,
-    variant=slowly("inertia_period", "Inertia varies slowly along the stroke, by {amplitude}"),
+    variant=slowly("inertia_period", "Inertia varies slowly along the stroke"),
 )

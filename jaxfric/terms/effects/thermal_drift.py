@@ -12,6 +12,7 @@ from ..base import AbstractTerm
 from ..effect import Effect, Extent
 from ..friction import Coulomb, Viscous
 from ..sample import UNKNOWN, Parameter, Scales
+from ..slow import OVER_RECORD
 from ..text import signed
 from ..time import AbstractModulated
 
@@ -54,15 +55,32 @@ def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:
     return tuple(ThermalDrift(kind, start=start) for kind in (Viscous(), Coulomb()))
 
 
+_LAWS = {"thermal_viscous": "viscous", "thermal_coulomb": "Coulomb"}
+
+
 def _of_law(values: Mapping[str, float], extent: Extent) -> str | None:
     """The sentence with which friction it is, and by how much."""
-    for name, words in (("thermal_viscous", "viscous"), ("thermal_coulomb", "Coulomb")):
+    for name, words in _LAWS.items():
         if name in values:
             return (
                 f"At the start {words} friction differs by {{{name}}} from where it settles, "
                 "with a time constant of {time_constant}: warming"
             )
     return None
+
+
+def _by_change(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence where a slow change may be the beginning of any larger one."""
+    words = next((words for name, words in _LAWS.items() if name in values), None)
+    if words is None:
+        return None
+    change = f": by {{{OVER_RECORD}:size}} over the record" if OVER_RECORD in values else ""
+    verb = "rises" if values.get(OVER_RECORD, 0.0) > 0 else "falls"
+    verb = verb if change else "drifts"
+    return (
+        f"{words[:1].upper()}{words[1:]} friction {verb} as the machine warms{change}; where it "
+        "settles, and how fast, this recording cannot tell"
+    )
 
 
 THERMAL_DRIFT = Effect(
@@ -77,4 +95,6 @@ THERMAL_DRIFT = Effect(
     separate_by="Repeat from cold: warming repeats, a step does not.",
     momentary=True,
     variant=_of_law,
+    settles="time_constant",
+    vague=_by_change,
 )

@@ -85,7 +85,7 @@ _PARTS = {
         "{thinning_viscous}, half as much at {thinning_velocity}",
         "a lubricant that thins",
     ),
-    "power_force": ("speed to the power of {exponent}", ""),
+    "power_force": ("speed {exponent:power}", ""),
 }
 
 
