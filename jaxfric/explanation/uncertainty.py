@@ -60,7 +60,10 @@ def by_rows(
     units = rows.evidence.motion.unit_names
 
     def asked(current: Fit) -> Fit:
-        current = freed(current, moved) if moved or selection.trusted else current
+        if moved or selection.trusted:
+            current = freed(current, moved)
+        elif selection.undetermined:  # what is none by choice has no error
+            current = freed(current, selection.free)
         return at_shapes(current) if shaped else current
 
     def again(evidence: Evidence, known: Fit) -> tuple[Fit, np.ndarray]:
