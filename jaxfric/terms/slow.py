@@ -33,6 +33,6 @@ def slowly(
         if not known:
             return f"{begin}, by {{amplitude}}{end}"
         listed = " and ".join((", ".join(known[:-1]), known[-1])) if known[1:] else known[0]
-        return f"{begin}: than in the middle of the stroke it is {listed}{end}"
+        return f"{begin}: compared with the middle of the stroke it is {listed}{end}"
 
     return told
