@@ -52,6 +52,8 @@ def read(
 
     **Arguments:**
 
+    - `path` of the file or folder, or the columns themselves, each `(N,)`, in the units that their
+      names state.
     - `columns`: role to column name, where names do not speak for themselves; roles beyond the
       usual ones (`time`, `position`, `velocity`, `force`, `reference`, `load`, `temperature`,
       `segment`) become channels; an empty name leaves a role out.
@@ -71,7 +73,7 @@ def read(
 
     **Returns:** a `Recording` with signals of shape `(N,)`, in jax's default float type.
 
-    **Raises:** `ValueError` naming file, place, fault and remedy.
+    **Raises:** `ValueError` naming file, place, fault and remedy, or for what is no table.
     """
     return read_with_notes(
         path,

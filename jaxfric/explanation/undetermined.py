@@ -5,6 +5,8 @@ any height of it fits them. Another recording that is slow for longer has then a
 nobody measured: what is not needed is none.
 """
 
+from collections.abc import Callable
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -16,7 +18,7 @@ from .acceptance import LINEARITY, OF_BASE
 from .baseline import as_given
 from .evidence import Evidence
 from .figures import Figures
-from .findings import Findings, Solution
+from .findings import Findings, Solution, alone
 from .holdout import measured
 from .improvement import Improved
 from .regression import Fit
@@ -37,7 +39,8 @@ def without_undetermined(better: Improved, figures: Figures) -> Improved:
     problem, last = findings.problem, findings.undelayed.selection.last
     size = max(findings.selection.remaining.size, 2)
     beside = list(by_rows(findings)[0].here.values())
-    alone = spelled.estimates(first, problem.block, problem.evidence.motion.unit_names)[0]
+    units = problem.evidence.motion.unit_names
+    by_itself = list(spelled.estimates(first, problem.block, units)[0].values())
     gone, less, left = tuple[int, ...](), better, last.energy
     for shape, own in enumerate(changed_columns(last.terms[0])):
         law = (*own, len(last.alphas[0]) + shape)
@@ -47,13 +50,13 @@ def without_undetermined(better: Improved, figures: Figures) -> Improved:
             energy = simpler.findings.undelayed.selection.last.energy
             if energy - left < max(price * left, OF_BASE * (better.first.energy - left)):
                 less, left = simpler, energy
-        if all(_may_be_none(list(alone.values())[i]) for i in own):
+        if all(_may_be_none(by_itself[i]) for i in own):
             simplest, _, _ = _fixed(first, problem.evidence, (*gone, *law))
             if simplest.energy < (1 + price) * first.energy:
                 first, gone = simplest, (*gone, *law)
     if less is better and not gone:
         return better
-    found = Findings(*(_with_base(each, gone) for each in less.findings))
+    found = _in_both(less.findings, lambda each: _with_base(each, gone))
     less = measured(less._replace(first=first, findings=found), figures)
     taken = better.before.here**2 - better.after.here**2
     as_well = less.after.here**2 - better.after.here**2 < max(LINEARITY**2, OF_BASE * taken)
@@ -75,10 +78,14 @@ def _without(better: Improved, law: tuple[int, ...]) -> Improved:
         selection = selection._replace(last=last, given=model, free=free, undetermined=gone)
         return Solution(problem, selection)
 
-    recorded, undelayed = better.findings
-    found = of(recorded)
-    same = undelayed is recorded
-    return better._replace(findings=Findings(found, found if same else of(undelayed)))
+    return better._replace(findings=_in_both(better.findings, of))
+
+
+def _in_both(findings: Findings, changed: Callable[[Solution], Solution]) -> Findings:
+    """The findings with both solutions changed, which are one where the force does not act late."""
+    recorded, undelayed = findings
+    found = changed(recorded)
+    return alone(found) if undelayed is recorded else Findings(found, changed(undelayed))
 
 
 def _with_base(solution: Solution, gone: tuple[int, ...]) -> Solution:
