@@ -80,9 +80,9 @@ def test_a_slow_variation_is_told_by_its_values_along_the_stroke():
     }
     told = sentence("gravity_unbalance", values, 0.4, (), Extent(0.0, 0.5))
     assert told.startswith(
-        "A force varies slowly along the stroke: compared with the middle of the stroke it is 1.40 N "
-        "± 0.60 N less at its low end, 1.20 N ± 0.20 N less at a quarter of it and 2.20 N ± 0.20 N "
-        "more at three quarters; it does not repeat"
+        "A force varies slowly along the stroke: compared with the middle of the stroke it is "
+        "1.40 N ± 0.60 N less at its low end, 1.20 N ± 0.20 N less at a quarter of it and "
+        "2.20 N ± 0.20 N more at three quarters; it does not repeat"
     )
     assert "cannot tell" not in told
 
