@@ -229,9 +229,14 @@ _COASTING = (0.2, 0.6, 2.0, 6.0)
 SWINGING = 0.5
 
 
+# Decelerations of a grid lie a factor of two and more apart: what changes one by a tenth is no
+# point of its own.
+_EVEN = 0.1
+
+
 def uneven(view: View) -> np.ndarray:
     """Asymmetries of a load: none, or that of all the machine's friction."""
-    return np.unique([0.0, view.asymmetry])
+    return np.unique([0.0, view.asymmetry if abs(view.asymmetry) > _EVEN else 0.0])
 
 
 def coasting(view: View) -> np.ndarray:
