@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification import devices, identifying
+from jaxfric.identification import devices, solving
 from jaxfric.identification.identified import result_names
 
 ROOT = Path(__file__).parents[1]
@@ -133,11 +133,11 @@ def test_a_velocity_is_smoothed_with_the_width_that_suits_its_row():
 def test_an_accelerator_takes_all_rows_at_once_and_says_the_same(monkeypatch):
     logs = jf.stack(recordings()[:3])
     alone = jf.identify("coulomb-viscous", logs)
-    assert identifying._at_once(3, 2000) == 3 and identifying._at_once(100, 2000) == 8
+    assert solving._at_once(3, 2000) == 3 and solving._at_once(100, 2000) == 8
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    assert identifying._at_once(100, 2000) == 100
-    assert identifying._at_once(10**6, 2000) * 2000 <= identifying.SAMPLES
-    assert identifying._at_once(3, 10**8) == 1
+    assert solving._at_once(100, 2000) == 100
+    assert solving._at_once(10**6, 2000) * 2000 <= solving.SAMPLES
+    assert solving._at_once(3, 10**8) == 1
     there = jf.identify("coulomb-viscous", logs)
     np.testing.assert_allclose(there.model.alpha, alone.model.alpha, rtol=1e-9)
 

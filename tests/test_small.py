@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification import identifying as identification, small
+from jaxfric.identification import small, solving
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 9])
@@ -47,7 +47,7 @@ def test_identification_calls_no_lapack(projection):
     term = jf.models.generalised()
 
     def solve(log):
-        found, _ = identification._identify(term, log, projection, 16, (), 8)
+        found, _ = solving.solve_one(term, log, projection, 16, (), 8)
         return found.model.alpha, found.covariance
 
     text = jax.jit(solve).lower(log).as_text()

@@ -18,11 +18,11 @@ from ..checks import Design
 from ..data.recording import Recording
 from ..models import Model
 from ..terms.base import AbstractTerm
-from . import identifying as identification
 from .checking import checked, looked_at
 from .identified import Identified, raise_unless_successful
 from .projections import AbstractProjection
 from .setup import Setup, ready_rows, set_up, together
+from .solving import solve_rows
 
 AXIS = "rows"
 
@@ -76,7 +76,7 @@ def solve(setup: Setup, faults: Callable[[], np.ndarray], over: Mesh | None = No
     count = setup.recording.time.shape[0]
     own = sum(device.process_index == jax.process_index() for device in over.devices.flat)
     if over.size == 1:
-        found, design = identification.solve_rows(*setup)
+        found, design = solve_rows(*setup)
     else:
         # Each device has as many rows; what is missing is filled up with the last one.
         full = -(-count // own) * own
@@ -90,7 +90,7 @@ def solve(setup: Setup, faults: Callable[[], np.ndarray], over: Mesh | None = No
 @eqx.filter_jit
 def _solve(setup: Setup, over: Mesh) -> tuple[Identified, Design]:
     def share(recording):
-        return identification.solve_rows(*setup._replace(recording=recording))
+        return solve_rows(*setup._replace(recording=recording))
 
     rows = PartitionSpec(AXIS)
     return jax.shard_map(share, mesh=over, in_specs=rows, out_specs=rows, check_vma=False)(

@@ -1,4 +1,4 @@
-"""Identification: the grid in one batched call, the refinement, the mass, the intervals."""
+"""Identification as it is called: one recording or a batch, its projection, its checks."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -8,32 +8,26 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
-from .. import checks, programs, signals
+from .. import signals
 from ..checks import Design
 from ..data.excerpt import excerpt
 from ..data.recording import Recording, require, uniform
 from ..models import Model
-from ..terms.base import AbstractTerm, Sum, bounds as term_bounds, summands
-from ..terms.inertia import Inertia
-from ..terms.sample import Scales
-from . import alignment, assessment, grouping, moments
+from ..terms.base import AbstractTerm
+from . import alignment, grouping
 from .checking import checked, looked_at
-from .identified import LEAST_EXPLAINED, Identified, raise_unless_successful
+from .identified import Identified, raise_unless_successful
 from .narrowing import narrowed, reaching
-from .projections import AbstractProjection, Rows, WeakForm
-from .search import Found, search
-from .setup import Setup, all_finite, ready_rows, sanitised, set_up, structure, together
+from .projections import AbstractProjection, WeakForm
+from .setup import Setup, ready_rows, set_up, structure, together
+from .solving import solve_one, solve_rows
 
 # Closed windows that use less than this share of the slip time leave most of the record's
 # information on the floor; those with less than this root of the squared speed's share, in one
 # direction, tell its viscous friction half as well as all of it would: a move that ends elsewhere
 # may be the only fast one. Then the weak form, which needs no closing, is the better choice.
 LEAST_COVERED = 0.5
-
-# Samples at once that keep an accelerator busy: some hundred numbers for each are 3 GB.
-SAMPLES = 2**22
 
 
 def identify(
@@ -148,7 +142,7 @@ def _together(
 
     prepared = ready(rows) if rows else None
     setup = set_up(how.model, recording, *how[1:4], width=width, prepared=prepared)
-    solve = solve_rows if batch else _identify
+    solve = solve_rows if batch else solve_one
     looked = looked_at(recording, rows, how.given) if rows else None
     found, design = solve(*setup)
     weak = WeakForm(setup.width)
@@ -199,171 +193,3 @@ def _too_open(found: Identified) -> bool:
     """Whether closed windows leave out too much of a recording that is not traced or a batch."""
     known = not isinstance(found.covered, jax.core.Tracer) and jnp.ndim(found.covered) == 0
     return known and float(found.covered) < LEAST_COVERED
-
-
-def _solve_rows(term, recording, projection, width, given, grid) -> tuple[Identified, Design]:
-    """What a [`Setup`][] of a batch describes, row by row."""
-
-    def one(row):
-        return _identify(term, row, projection, width, given, grid)
-
-    return jax.lax.map(one, recording, batch_size=_at_once(*recording.time.shape))
-
-
-def _at_once(count: int, samples: int) -> int:
-    """How many rows of so many samples go at once."""
-    if jax.default_backend() != "cpu":
-        return max(1, min(SAMPLES // samples, count))
-    # Small batches: a refinement loop under vmap makes every row wait for the slowest.
-    return min(8, count)
-
-
-solve_rows = programs.compiled(_solve_rows)
-
-
-class _Searched(NamedTuple):
-    """What the nonlinear parameters were searched in, and what was found; the velocity's noise.
-
-    `inertial`: what was taken off the force in closed windows.
-    """
-
-    limits: Scales
-    noise: Float[Array, ""]
-    rows: Rows
-    found: Found
-    inertial: "assessment.InertialForce | None"
-
-
-@programs.compiled
-def _search_rows(magnitudes, term, recording, projection, width, given, grid) -> _Searched:
-    """The nonlinear parameters."""
-    recording = sanitised(recording)
-    limits, noise = _magnitudes(recording) if magnitudes is None else magnitudes
-    rows = projection.rows(recording, limits)
-    active, inertial = _active(term, projection, limits), None
-    if active.nonlinear and not projection.keeps_inertia:
-        inertial = assessment.inertial_force(recording, limits, rows)
-        rows = eqx.tree_at(lambda r: r.target, rows, rows.target - inertial.force)
-    box = term_bounds(
-        active, limits._replace(fastest=_reached(rows, recording, limits)), dict(given)
-    )
-    # By default both directions have the bounds that the whole recording suggests.
-    alike = not any(name.endswith(("+", "-")) for name, _ in given)
-    found = search(active, recording, rows, box, grid, alike)
-    return _Searched(limits, noise, rows, found, inertial)
-
-
-@programs.compiled
-def _assess(
-    searched: _Searched, term, recording, projection, width, given, grid
-) -> tuple[Identified, Design]:
-    """All parameters and what is known about them, from the nonlinear ones."""
-    limits, noise, rows, best, inertial = searched
-    beta, converged, border, alpha = best[:4]
-    finite = all_finite(recording)
-    recording = sanitised(recording)
-    weak = rows if projection.keeps_inertia else WeakForm(width).rows(recording, limits)
-    active = _active(term, projection, limits)
-    alpha, jacobian, error = assessment.solve(active, beta, recording, rows, alpha)
-    weight = rows.positive + rows.negative
-    minimum = jnp.sum(weight * (error if inertial is None else error + inertial.force) ** 2)
-    fitted, residual = alpha, error
-    alpha, spread, design, pull = assessment.solved(
-        active.with_beta(beta),
-        alpha,
-        jacobian,
-        error,
-        term,
-        recording,
-        limits,
-        rows,
-        weak,
-        inertial,
-    )
-    beta, matrix = moments.dated(
-        active, fitted, beta, recording, rows, limits.interval, residual, spread.covariance
-    )
-    nothing = ~finite | (jnp.sum(weight) <= 0)
-    alpha = jnp.where(nothing, jnp.nan, alpha)
-    matrix = jnp.where(nothing, jnp.inf, matrix)
-    unseen = assessment.unseen(term, active, jacobian, weight) & jnp.isinf(jnp.diagonal(matrix))
-    # What acts in no row is anywhere in its bounds.
-    border = border & ~unseen[alpha.size :]
-    known = jnp.where(unseen, jnp.nan, jnp.concatenate([alpha, beta.astype(alpha.dtype)]))
-    model = Model(
-        term.with_beta(known[alpha.size :].astype(beta.dtype)), known[: alpha.size], recording.units
-    )
-    slipping = limits.fastest > signals.SLIP_DEVIATIONS * noise
-    hidden = jnp.any(jnp.isinf(jnp.diagonal(matrix)))
-    rival = jnp.full_like(beta, jnp.nan) if best.rival is None else best.rival
-    ambiguous = assessment.outside(rival, beta, matrix)
-    error = weak.relative(design.left)
-    odd = assessment.Oddities(
-        described=~(error**2 > 1 - LEAST_EXPLAINED),
-        passive=assessment.passive(term, alpha, matrix, design, weak, recording),
-    )
-    found = Identified(
-        model,
-        matrix,
-        assessment.verdict(
-            finite,
-            slipping,
-            jnp.sum(weight) > 0,
-            hidden,
-            jnp.any(border),
-            converged,
-            ambiguous | assessment.still_falling(term, alpha, matrix),
-            odd,
-        ),
-        rows.windows,
-        rows.covered,
-        error,
-        minimum,
-        pull,
-        jnp.asarray(projection.keeps_inertia),
-        jnp.where(ambiguous, rival, jnp.nan) if beta.size else None,
-        jnp.full(len(checks.NAMES), jnp.nan, error.dtype),
-        border if beta.size else None,
-    )
-    return found, design
-
-
-def _identify(*setup) -> tuple[Identified, Design]:
-    """What a [`Setup`][] of one recording describes, in two programs.
-
-    What is found once in a recording is found on the host, where it needs no compiling.
-    """
-    recording = setup[1]
-    magnitudes = None
-    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(setup)):
-        magnitudes = signals.host_scales(sanitised(jax.tree.map(np.asarray, recording), np))
-    return _assess(_search_rows(magnitudes, *setup), *setup)
-
-
-def _magnitudes(recording: Recording) -> tuple[Scales, Float[Array, ""]]:
-    limits = signals.scales(recording)
-    return limits, signals.velocity_noise(recording, limits.interval)
-
-
-def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, ""]:
-    """The speed that both directions reach in the rows, m/s: no faster bump could be seen."""
-    velocity = recording.velocity
-    used = jnp.stack([rows.positive > 0, rows.negative > 0])
-    if rows.target.shape != velocity.shape:
-        used = jnp.stack([velocity > 0, velocity < 0])
-    top = jnp.max(jnp.where(used, jnp.abs(velocity)[None, :], 0.0), axis=1)
-    both = jnp.min(jnp.where(top > limits.slowest, top, jnp.inf))
-    return jnp.maximum(jnp.minimum(limits.fastest, both), 4 * limits.slowest)
-
-
-def _active(term: AbstractTerm, projection, limits: Scales) -> AbstractTerm:
-    """The terms that are fitted, with moments that have a derivative."""
-    own = term if projection.keeps_inertia else _without_inertia(term)
-    return own.resolved(moments.RAMP * limits.interval)
-
-
-def _without_inertia(term: AbstractTerm) -> AbstractTerm:
-    kept = tuple(t for t in summands(term) if not isinstance(t, Inertia))
-    if not kept:
-        raise ValueError("The model has no term but inertia; add friction, e.g. terms.Coulomb().")
-    return Sum(kept)
