@@ -349,6 +349,39 @@ def test_a_motion_that_repeats_and_a_force_of_another_unit_are_no_clock():
     assert not wrong(joint).keys() & {"clock", "force_limit", "end_stop"}
 
 
+def bristled(stiffness, seed):
+    """An axis whose friction builds up over a way, beside a simulator in which it jumps."""
+    step, draw = 0.001, np.random.default_rng(seed)
+    time = np.arange(0, 16, step)
+    rates, sizes = 2 * np.pi * np.array([0.25, 0.8, 2.3]), np.array([0.02, 0.004, 0.0004])
+    angle = rates * time[:, None] + draw.uniform(0, 6, 3)
+    position, speed = np.sin(angle) @ sizes, np.cos(angle) @ (rates * sizes)
+    plain = 20 * speed - 3 * np.sin(angle) @ (rates**2 * sizes)
+    level = 14 + 3 * np.exp(-((speed / 0.01) ** 2))
+    bent = np.zeros_like(time)
+    for i in range(1, len(time)):
+        rate = speed[i] - abs(speed[i]) * stiffness / level[i] * bent[i - 1]
+        bent[i] = bent[i - 1] + step * rate
+    noise = 0.15 * draw.normal(size=time.shape)
+    log = Recording(time, plain + stiffness * bent + noise, position)
+    return Part(log, None, Known(plain + level * np.sign(speed)))
+
+
+@pytest.mark.parametrize(("stiffness", "seed"), [(70e3, 0), (20e3, 1)])
+def test_friction_that_builds_up_over_a_way_is_no_clock(stiffness, seed):
+    (axis,) = check_logs([bristled(stiffness, seed)])
+    assert not wrong(axis)
+
+
+def test_rows_that_a_shift_spoils_weigh_as_much_as_before():
+    """They have more noise for it, which must not make what is left of them small."""
+    part = bristled(70e3, 0)
+    rows = faults._rows(part)
+    (shifted,) = faults._put_right([part], [rows], faults.Faults(late=0.8))
+    assert shifted.power > 4 * rows.power
+    assert faults._energy([shifted]) > 4 * faults._energy([rows])
+
+
 def test_a_factor_of_a_thousand_is_a_unit(motion):
     time, position, force = motion
     recording = Recording(time, 1000 * force[:, 1], position[:, 1], units=UNITS)

@@ -103,18 +103,22 @@ def _with_clock(seen: FaultSearch, number: int, own: Faults) -> FaultSearch:
 
 def find(parts: Sequence[Part]) -> FaultSearch:
     """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
-    seen = _found(parts, Faults())
-    late = _shift([_rows(part) for part in parts])
+    recorded = [_rows(part) for part in parts]
+    seen = _found(parts, recorded, Faults())
+    late = _shift(recorded)
     if not late:
         return seen
     # The shift knows of few values: of a spring, say, it makes a clock.
-    shifted = _found(parts, Faults(late=late))
-    return shifted if shifted.faults.clock and shifted.left < HALVED * seen.left else seen
+    shifted = _found(parts, recorded, Faults(late=late))
+    enough = min(HALVED * seen.left, LEAVES)
+    return shifted if shifted.faults.clock and shifted.left < enough else seen
 
 
-def _found(parts: Sequence[Part], faults: Faults) -> FaultSearch:
-    rows = [_rows(part, faults) for part in parts]
-    before = _energy(rows if not faults.late else [_rows(part) for part in parts])
+def _found(parts: Sequence[Part], recorded: list[Rows], faults: Faults) -> FaultSearch:
+    """Where a search that begins with some faults ends; the rows as `recorded` say what they are
+    better than.
+    """
+    rows, before = _put_right(parts, recorded, faults), _energy(recorded)
     known = {OFFSET} if faults.late else set[str]()
     stack = _stack(parts, rows, faults)
     chosen = _chosen(stack, rows)
@@ -129,7 +133,7 @@ def _found(parts: Sequence[Part], faults: Faults) -> FaultSearch:
     if known:
         faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen)
     if _energy(rows) > before or not _matters(faults, parts):
-        faults, rows = Faults(), [_rows(part) for part in parts]
+        faults, rows = Faults(), recorded
         stack = _stack(parts, rows, faults)
     left = energy(stack, chosen) / max(before, 1e-300)
     beside = [name for name in chosen if not _is_fault(name)]
@@ -167,7 +171,7 @@ def _refined(
         steps = {name: values[name][0] for name in names}
         faults = _moved(faults, steps)
         faults = faults._replace(errors={name: values[name][1] for name in names})
-        rows = [_rows(part, faults) for part in parts]
+        rows = _put_right(parts, rows, faults)
         stack = _stack(parts, rows, faults)
         if all(abs(step) < CLOSE * values[name][1] for name, step in steps.items()):
             break
@@ -203,16 +207,28 @@ def _moved(faults: Faults, steps: Mapping[str, float]) -> Faults:
     return faults._replace(zeros=zeros, late=late, drift=faults.drift + steps.get(DRIFT, 0.0))
 
 
-def _rows(part: Part, faults: Faults | None = None) -> Rows:
-    faults = faults or Faults()
-    log = put_right(part.recording, faults)
-    simulator = part.simulator
-    rows = rows_of(simulator.beside(log), simulator.baseline(log.units))
-    if not any(faults.zeros.values()) or not isinstance(simulator, Mujoco):
-        return rows
-    change = _differences(simulator, log, faults.zeros)
-    off = rows.evidence.project(change(rows))
-    return rows._replace(target=rows.target - off, known=rows.known + off)
+def _rows(part: Part) -> Rows:
+    log, simulator = part.recording, part.simulator
+    return rows_of(simulator.beside(log), simulator.baseline(log.units))
+
+
+def _put_right(parts: Sequence[Part], before: Sequence[Rows], faults: Faults) -> list[Rows]:
+    """The rows of all joints without the faults, as heavy as those `before`, of which some may be
+    gone with the ends of the record: else a shift that spoils the rows would look like noise.
+    """
+    if not faults.zeros and not faults.clock:
+        return list(before)
+    found = []
+    for part, own in zip(parts, before, strict=True):
+        log = put_right(part.recording, faults)
+        rows = _rows(part._replace(recording=log))
+        weight = own.weight * np.sqrt(len(own.target) / len(rows.target))
+        rows = rows._replace(weight=float(weight))
+        if any(faults.zeros.values()) and isinstance(part.simulator, Mujoco):
+            off = rows.evidence.project(_differences(part.simulator, log, faults.zeros)(rows))
+            rows = rows._replace(target=rows.target - off, known=rows.known + off)
+        found.append(rows)
+    return found
 
 
 def put_right(recording: Recording, faults: Faults) -> Recording:
