@@ -7,12 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import models, terms
+from jaxfric import Recording, models, terms
 from jaxfric.cli import main
 from jaxfric.explanation import Earlier, common_factor, explain
 from jaxfric.explanation.baseline import Baseline
+from jaxfric.explanation.evidence import gather
 from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.mismatch import Mismatch
+from jaxfric.explanation.regression import fit
 from jaxfric.explanation.sentences import changed_sentence, parameter
 from jaxfric.identification.uncertainty import Estimate
 
@@ -94,6 +96,34 @@ def test_another_homing_is_no_change(healthy):
     moved = dataclasses.replace(new, position=new.position + jnp.asarray(0.0037))
     found = explain(moved, Earlier(old))
     assert found.verdict == "consistent", found.summary
+
+
+def fine(draw, start):
+    """A screw of 50 turns a stroke with an error of its pitch, and where it moved."""
+    time = np.arange(0, 12, 0.002)
+    rates, sizes = 2 * np.pi * np.array([0.13, 0.37]), np.array([0.2, 0.05])
+    angle = rates * time[:, None] + start
+    position, speed = np.sin(angle) @ sizes, np.cos(angle) @ (rates * sizes)
+    force = -4 * np.sin(angle) @ (rates**2 * sizes) + 15 * np.sign(speed) + 40 * speed
+    force += 2 * np.sin(2 * np.pi * position / 0.01) + 0.2 * draw.normal(size=time.shape)
+    return Recording(time, force, position)
+
+
+@pytest.mark.slow
+def test_a_fine_wave_of_the_earlier_recording_is_known_by_its_period():
+    """Of fifty cycles a stroke a coarse grid finds another one, and leaves the wave."""
+    draw = np.random.default_rng(5)
+    old, new = fine(draw, 0.0), fine(draw, 1.0)
+    found = explain(new, Earlier(old))
+    assert found.verdict == "consistent" and not found.findings
+
+
+def test_a_baseline_with_a_fine_wave_is_fitted_at_its_period():
+    evidence = gather(fine(np.random.default_rng(5), 0.0))
+    whole = terms.Sum((terms.Inertia(), terms.Coulomb(), terms.Viscous(), terms.Cogging()))
+    base = fit([whole], evidence, [None])
+    assert base.betas[0][-1] == pytest.approx(0.01, rel=1e-4)
+    assert base.energy < 1e-3 * float(evidence.target @ evidence.target)
 
 
 def test_values_that_the_earlier_recording_hardly_shows_tell_no_factor():

@@ -54,7 +54,7 @@ def baseline_of(given) -> Baseline:
         require(given, "explain (baseline)")
         _check_values(given)
         name = "simulator" if KNOWN_FORCE in given.term.coordinates else "model"
-        return Baseline(given.term, name, given)
+        return Baseline(given.term, name, given, start=beginning(given.term))
     if isinstance(given, AbstractTerm):
         return Baseline(given, "model")
     raise ValueError(
@@ -62,6 +62,16 @@ def baseline_of(given) -> Baseline:
         "Identified, simulators.Known(force), a function from a recording to a simulator's force, "
         "or a Recording: an earlier one of this machine, or of another simulator."
     )
+
+
+def beginning(term: AbstractTerm) -> np.ndarray | None:
+    """The parameters of a term that comes with values, `(d,)`, where it has a wave: whose period is
+    known to a part of a cycle in the stroke, which no grid tells as well. `None`, to look for them
+    anew, of others.
+    """
+    if not any(parameter.repeats for parameter in term.nonlinear):
+        return None
+    return np.asarray(term.beta(), float).reshape(len(term.nonlinear))
 
 
 def _check_values(model: Model) -> None:

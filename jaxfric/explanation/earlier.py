@@ -11,7 +11,7 @@ import numpy as np
 from ..data.recording import Recording
 from . import parameters as spelled, verification
 from .acceptance import LINEARITY
-from .baseline import Baseline
+from .baseline import Baseline, beginning
 from .evidence import Evidence
 from .findings import Solution
 from .intervals import spread
@@ -56,14 +56,16 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
         "holdout_force_error": None,
         "noise_floor": verification.noise(current, evidence.force),
     }
+    model = spelled.model(current, recording.units)
     return Baseline(
         spelled.whole(current),
         f"recording {PurePath(recording.source).name}".rstrip(),
-        spelled.model(current, recording.units),
+        model,
         spread(current, problem.block).covariance,
         current,
         frozenset(each.coordinate for each in found),
         rough(errors, {}),
+        beginning(model.term),
     )
 
 

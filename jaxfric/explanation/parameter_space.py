@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..identification.grids import resolution
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -11,6 +12,8 @@ from ..terms.sample import Scales
 # wave with five hundred cycles over the record, whose coordinate spans e⁷, the phase at the end
 # moves by 2π · 500 · 7 times as much.
 STEP, OF_WAVES = 1e-4, 1e-7
+# Points along a parameter of which the energy is smooth; and most points along a period.
+GRID, MOST = 24, 1 << 12
 
 
 class Space:
@@ -19,8 +22,9 @@ class Space:
     def __init__(self, terms: Sequence[AbstractTerm], limits: Scales):
         limits = Scales(*map(np.asarray, limits))
         boxes = [_box(term, limits) for term in terms]
+        self.limits = limits
         self.counts = [len(term.nonlinear) for term in terms]
-        parameters = [p for term in terms for p in term.nonlinear]
+        self.parameters = parameters = [p for term in terms for p in term.nonlinear]
         self.log = np.array([p.logarithmic for p in parameters], bool)
         self.step = np.array([OF_WAVES if p.repeats else STEP for p in parameters])
         box = np.concatenate(boxes, axis=1)
@@ -37,6 +41,20 @@ class Space:
         """Coordinates of parameters, moved inside the set."""
         raw = np.where(self.log, np.log(np.where(self.log, beta, 1.0)), beta)
         return np.clip((raw - self.low) / (self.high - self.low), 0.0, 1.0)
+
+    def grid(self, number: int) -> np.ndarray:
+        """Coordinates at which one parameter is looked for, `(G,)`: of a period as near to each
+        other as two minima are.
+        """
+        how = resolution(self.parameters[number])
+        if how.over is None:
+            return (np.arange(GRID) + 0.5) / GRID
+        ends = self.beta(np.outer([0.0, 1.0], np.ones(len(self.low))))[:, number] ** how.power
+        features = float(how.over(self.limits)) * abs(ends[1] - ends[0])
+        count = int(np.clip(how.per * features, GRID, MOST))
+        beta = np.repeat(self.beta(np.full(len(self.low), 0.5))[None], count, axis=0)
+        beta[:, number] = np.linspace(*ends, count) ** (1 / how.power)
+        return self.point(beta)[:, number]
 
     def rate(self, point: np.ndarray) -> np.ndarray:
         """Derivatives of the parameters by their coordinates."""

@@ -20,10 +20,11 @@ from ..terms.base import AbstractTerm, changed_columns, summands
 from ..units import FORCE
 from .evidence import Evidence
 from .least_squares import bounded, orthonormal
-from .parameter_space import Space
+from .parameter_space import GRID, Space
 
-GRID = 24
 ITERATIONS = 20
+# Columns of a grid that are in memory at once.
+TOGETHER = 512
 # Steps tried from one point, and by how much one of them may raise the damping.
 TRIALS, STEEPEST = 6, 64.0
 # Parts of the energy: a refinement ends with a step that gains less than `ENOUGH`, half a
@@ -207,7 +208,10 @@ def gains(
 ) -> np.ndarray:
     """The energy that a term removes at many β beside an orthonormal basis, N², `(G,)`."""
     left = evidence.target - basis @ (basis.T @ evidence.target)
-    own = [orthonormal(rows, basis).T @ left for rows in evidence.columns(term, betas)]
+    parts = (betas[i : i + TOGETHER] for i in range(0, len(betas), TOGETHER))
+    own = [
+        orthonormal(rows, basis).T @ left for some in parts for rows in evidence.columns(term, some)
+    ]
     return np.array([np.sum(each**2) for each in own])
 
 
@@ -287,7 +291,6 @@ def _scan(terms, evidence, space, point, unknown):
     """Coordinates found one after the other, each by a grid with the others held, twice over."""
     owner = np.repeat(np.arange(len(terms)), space.counts)
     free = [i for i in range(len(point)) if owner[i] in unknown]
-    grid = (np.arange(GRID) + 0.5) / GRID
     done: dict[int, np.ndarray] = {}  # where the others were held at a parameter's last scan
     for _ in range(2 if len(free) > 1 else 1):
         for i in free:
@@ -296,7 +299,8 @@ def _scan(terms, evidence, space, point, unknown):
                 continue
             done[i] = others_at
             number = owner[i]
-            tried = np.repeat(point[None, :], GRID, axis=0)
+            grid = space.grid(i)
+            tried = np.repeat(point[None, :], len(grid), axis=0)
             tried[:, i] = grid
             betas = space.split(space.beta(tried))[number]
             others = [
