@@ -53,7 +53,7 @@ class Space:
         features = float(how.over(self.limits)) * abs(ends[1] - ends[0])
         count = int(np.clip(how.per * features, GRID, MOST))
         beta = np.repeat(self.beta(np.full(len(self.low), 0.5))[None], count, axis=0)
-        beta[:, number] = np.linspace(*ends, count) ** (1 / how.power)
+        beta[:, number] = np.linspace(float(ends[0]), float(ends[1]), count) ** (1 / how.power)
         return self.point(beta)[:, number]
 
     def rate(self, point: np.ndarray) -> np.ndarray:
