@@ -12,8 +12,8 @@ import numpy as np
 from .candidates import scaled
 from .evidence import Evidence
 from .regression import Fit, fit
-from .significance import BlockBootstrap, Scan, adjusted, blocks
-from .spectral_lines import SpectralLines, line_frequencies
+from .significance import LEVEL, BlockBootstrap, Scan, adjusted, blocks
+from .spectral_lines import OVERSAMPLING, SpectralLines, line_frequencies
 from .threads import each
 
 # Knots of a curve: two periods in the stroke with six knots each, where the lines take over.
@@ -92,19 +92,23 @@ def _structure(seen: _Scanned, p_value: float, current: Fit) -> Structure:
     return Structure(seen.name, share, size, p_value, seen.peak, curve)
 
 
-def repeated(found: list[Structure], current: Fit, held: Evidence) -> list[Structure]:
+def repeated(
+    found: list[Structure], current: Fit, held: Evidence, seed: int = 0
+) -> list[Structure]:
     """The structure whose curve lowers the residual of a fit on another recording.
 
-    The fit's parameters may move there; `held` with the fit's predictions. Coordinates of time,
-    lines, whose phase may be another, and signals that the other recording lacks are not tested,
-    and stay.
+    The fit's parameters may move there; `held` with the fit's predictions. A line over position is
+    looked for at any phase, as another homing makes it. Coordinates of time and signals that the
+    other recording lacks are not tested, and stay.
     """
     there, known = fit(current.terms, held, current.betas, 0), coordinates(held)
     basis = there.basis()
     residual = there.residual - basis @ (basis.T @ there.residual)
 
     def again(each: Structure) -> bool:
-        # A spectral line is no coordinate of a curve.
+        if each.coordinate == "position_lines" and held.motion.position is not None:
+            return _recurs(each.peak, there, held, seed)
+        # A line in time is no coordinate of a curve.
         if each.coordinate.startswith("time") or each.coordinate not in known:
             return True
         knots, heights = each.curve
@@ -113,6 +117,28 @@ def repeated(found: list[Structure], current: Fit, held: Evidence) -> list[Struc
         return bool(np.sum((residual - curve) ** 2) < np.sum(residual**2))
 
     return [each for each in found if again(each)]
+
+
+def _recurs(peak: float, there: Fit, held: Evidence, seed: int) -> bool:
+    """Whether a fit leaves a line over position in another recording, 1/m, at any phase, beyond
+    chance; also where that one cannot show it.
+    """
+    span = held.limits.high - held.limits.low
+    near = np.abs(peak + np.array([-1.0, 0.0, 1.0]) / (OVERSAMPLING * span))
+    block = blocks(held.elapsed[held.centre], held.reach)
+    scan = BlockBootstrap(there, block, seed)(
+        scaled(SpectralLines("position", False).columns(held, near))
+    )
+    (p_value,) = adjusted(np.array([scan.gain.max()]), scan.drawn[None])
+    return bool(p_value <= LEVEL or not scan.dimension.any())
+
+
+def without_line(current: Fit, evidence: Evidence, found: Structure) -> Fit:
+    """A fit whose residual is without a line."""
+    wave = SpectralLines(found.coordinate.removesuffix("_lines"), False)
+    columns = wave.columns(evidence, np.array([found.peak]))[0]
+    residual = current.residual - columns @ np.linalg.lstsq(columns, current.residual)[0]
+    return current._replace(residual=residual)
 
 
 def coordinates(evidence: Evidence) -> dict[str, tuple[np.ndarray, np.ndarray, str]]:

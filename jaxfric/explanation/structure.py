@@ -12,7 +12,7 @@ from .bins import unit
 from .evidence import Evidence
 from .finding import Finding
 from .improvement import Improved
-from .locate import ACCELERATED, Structure, locate, repeated
+from .locate import ACCELERATED, Structure, locate, repeated, without_line
 from .mismatch import Mismatch
 from .predictions import with_predictions
 from .problem import PERSISTS, Problem
@@ -54,7 +54,7 @@ def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int)
     located = locate(with_predictions(problem.evidence, current), current, seed)
     found = significant(located, share, size)
     found = through_wide(found, current, problem.wide, seed)
-    return Shown(lasting(found, current, problem), located[:1])
+    return Shown(lasting(found, current, problem, seed), located[:1])
 
 
 def significant(found: list[Structure], share: float, size: float) -> list[Structure]:
@@ -84,16 +84,24 @@ def through_wide(
     return [s for s in found if s.coordinate not in ACCELERATED or lasts(s)]
 
 
-def lasting(found: list[Structure], current: Fit, problem: Problem) -> list[Structure]:
+def lasting(
+    found: list[Structure], current: Fit, problem: Problem, seed: int = 0
+) -> list[Structure]:
     """The structure that the held-out recording shows too, and that is no slow part of the noise.
 
     Every axis has a load that wanders: a slow one that is no larger than what differs from row to
-    row is the same noise.
+    row is the same noise. So is a line in time of that size which no law was found for.
     """
-    found = [s for s in found if s.coordinate != "time" or s.size > fast(current)]
+
+    def wanders(each: Structure) -> bool:
+        if each.coordinate == "time_lines":
+            return each.size <= fast(without_line(current, problem.evidence, each))
+        return each.coordinate == "time" and each.size <= fast(current)
+
+    found = [each for each in found if not wanders(each)]
     if problem.held is None:
         return found
-    return repeated(found, current, with_predictions(problem.held, current))
+    return repeated(found, current, with_predictions(problem.held, current), seed)
 
 
 def documents(

@@ -82,7 +82,7 @@ def summarise(
         for some in (before.counts, after)
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
-    missing |= not findings and _halvable(selection, filtered)
+    missing |= not findings and _halvable(better.findings, filtered)
     missing |= _values_differ(errors, effects, apart)
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
@@ -140,10 +140,13 @@ def _values_differ(
     return bool(apart and errors.get("holdout_values"))
 
 
-def _halvable(selection: Selection, filtered: Mapping[str, Any]) -> bool:
-    """Whether a law that was not accepted halves what is left, of more than a sensor resolves."""
-    left = filtered["force_error"]["after"]
-    return left > LINEARITY and halvable(selection.remaining)
+def _halvable(findings: Findings, filtered: Mapping[str, Any]) -> bool:
+    """Whether a law that was not accepted halves what is left, of more than a sensor resolves: a
+    part of its full scale, which is the largest force at least.
+    """
+    evidence = findings.problem.evidence
+    left = filtered["force_error"]["after"] * float(np.sqrt(np.mean(evidence.force**2)))
+    return left > LINEARITY * evidence.peak and halvable(findings.selection.remaining)
 
 
 def _drawn(
