@@ -6,7 +6,7 @@ import numpy as np
 
 from ..models import Model
 from . import parameters as spelled
-from .acceptance import LEAST_OF_BASE, LEAST_SHARE, LINEARITY
+from .acceptance import LEAST_OF_BASE, LEAST_SHARE, LINEARITY, MOST, OF_BASE
 from .baseline import as_given, at_values
 from .evidence import Evidence
 from .fewest import MOST_WRONG, SURE, fewest
@@ -54,7 +54,8 @@ def mismatch(
     `refitted`: with all values free, beside the terms found: values and missing physics are tested
     together. The refitted parameters differ from the given ones (all of them together at 1 %) and
     take enough of the residual, and of the baseline's: below a hundredth of its amplitude no term
-    is known to follow its law. Of those the fewest are moved that leave no more than all of them
+    is known to follow its law, and beside laws, which have not quite the shape of their effect, as
+    much is needed as of a later term. Of those the fewest are moved that leave no more than all of them
     do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the width,
     which have to show them too.
     """
@@ -62,6 +63,8 @@ def mismatch(
     residual, own, beside = apart(model, refitted, evidence)
     gained = given.energy - refitted.energy
     least = max(LEAST_SHARE * given.energy, LEAST_OF_BASE * first)
+    if len(refitted.terms) > 1:
+        least = max(least, min(OF_BASE * first, MOST * given.energy))
     block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
     raw = (own / np.maximum(np.abs(own).max(axis=0), 1e-300)).T[None]
     empty = given._replace(columns=beside, slopes=np.zeros((len(own), 0)))
