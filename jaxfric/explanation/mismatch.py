@@ -55,9 +55,9 @@ def mismatch(
     together. The refitted parameters differ from the given ones (all of them together at 1 %) and
     take enough of the residual, and of the baseline's: below a hundredth of its amplitude no term
     is known to follow its law, and beside laws, which have not quite the shape of their effect, as
-    much is needed as of a later term. Of those the fewest are moved that leave no more than all of them
-    do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the width,
-    which have to show them too.
+    much is needed as of a later term. Of those the fewest are moved that leave no more than all of
+    them do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the
+    width, which have to show them too.
     """
     given, first = as_given(model, refitted, evidence), at_values(model, evidence).energy
     residual, own, beside = apart(model, refitted, evidence)
