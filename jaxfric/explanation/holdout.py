@@ -17,6 +17,7 @@ from .motion import Motion
 from .predictions import with_predictions
 from .problem import with_holdout
 from .selection import Selection
+from .slow_changes import slow, stroke_of
 from .uncertainty import by_rows
 
 
@@ -130,11 +131,16 @@ def measured(better: Improved, figures: Figures) -> Improved:
 def _rephased(findings: Findings) -> Findings:
     """The findings, each wave over position at another phase there if only so it is confirmed.
 
-    The zero of an incremental encoder is another after each homing.
+    The zero of an incremental encoder is another after each homing. What does not repeat within the
+    stroke has no phase: any slow change is near to a part of some wave.
     """
-    selection = findings.undelayed.selection
+    problem, selection = findings.undelayed
+    stroke = stroke_of(problem.evidence.limits)
     for number in range(len(selection.selected)):
-        wave = verification.wavelike(selection.last, selection.term_index(number))
+        index, last = selection.term_index(number), selection.last
+        wave = verification.wavelike(last, index) and not slow(
+            last.terms[index], last.betas[index], stroke
+        )
         if not wave or _borne_out(findings, number):
             continue
         turned = findings.with_selected([
