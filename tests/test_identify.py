@@ -414,6 +414,26 @@ def test_a_force_of_the_wrong_sign_is_no_load():
     assert [remark.name for remark in found.remarks] == ["negative_parameter"]
 
 
+def _passing(width):
+    """An axis that passes zero quickly, with bumps of 4 N and that width, m/s, beside it."""
+    draw, time = np.random.default_rng(0), np.arange(0, 20, 0.002)
+    rate = 2 * np.pi * 0.3
+    speed = np.sign(np.sin(rate * time)) * (0.3 + 3 * np.sin(rate * time) ** 2)
+    speed = np.convolve(speed, np.ones(40) / 40, "same")
+    force = 0.5 * np.gradient(speed, time) + 2 * speed + 0.3 * draw.normal(size=time.shape)
+    force += np.sign(speed) * (10 + 4 * np.exp(-((speed / width) ** 2)))
+    return jf.Recording(time, force, np.cumsum(speed) * 0.002, speed)
+
+
+@pytest.mark.parametrize(("width", "told"), [(0.05, False), (0.02, True)])
+def test_a_size_whose_width_may_be_anything_is_told(width, told):
+    """0.22 ± 0.11 N of a bump of 4 N, as its width is 0.11 ± 0.12 m/s instead of 0.02."""
+    found = jf.identify("gaussian", _passing(width))
+    assert ("shape_unknown" in {remark.name for remark in found.remarks}) == told
+    off = abs(float(found.parameters["stribeck_force-"].value) - 4.0)
+    assert told or off < found.parameters["stribeck_force-"].half_width()
+
+
 @pytest.mark.slow
 def test_a_direction_that_never_moved_is_named():
     run = recording(machine(), noise=0.05)

@@ -285,6 +285,13 @@ KINDS = (
         "friction still falls at the fastest speed, where a Stribeck curve has not ended.",
     ),
     Kind(
+        "shape_unknown",
+        False,
+        "{value:.0f} of the widths and velocities that were searched may be anything down to zero, "
+        "so that the size that goes with each, and its interval, hold for about the value told: of "
+        "a narrower bump the height is another one. Move slowly there, or give --bounds.",
+    ),
+    Kind(
         "large_error",
         False,
         "The model leaves {value:.0%} of the force, as noise or as something faster than the rows: "

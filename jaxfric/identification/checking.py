@@ -12,6 +12,7 @@ import numpy as np
 from .. import checks, signals
 from ..checks import Design
 from ..data.recording import Recording, row_of
+from ..terms.base import changed_columns
 from . import constant_load, uncertainty
 from .identified import Identified, Result, result_names
 
@@ -60,6 +61,7 @@ def checked(
         np.array(x, float, ndmin=n)
         for x, n in ((found.model.alpha, 2), (found.covariance, 3), (found.filtered_force_error, 1))
     )
+    betas = np.array(found.model.term.beta(), float).reshape(len(alphas), -1)
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     delayed = found.model.force_delay is not None
@@ -92,6 +94,8 @@ def checked(
             warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
+        if open_shapes := _open_shapes(found, betas[i], matrices[i], alpha, half):
+            warnings[i, SHAPE] = open_shapes
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
             # What accelerates the axis there is noise.
             k = names.index("inertia")
@@ -128,6 +132,22 @@ def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passi
     return int(np.sum((alpha + half)[counted] < 0))
 
 
+def _open_shapes(
+    found: Identified, beta: np.ndarray, matrix: np.ndarray, alpha: np.ndarray, half: np.ndarray
+) -> int:
+    """How many ratio-scaled shapes are known no better than down to zero, of sizes that seem sure.
+
+    `beta`, `(d,)`; `matrix`, `(P, P)`; `alpha` and their `half` widths, `(p,)`. An interval is a
+    straight line's: so far from the value the size is another one.
+    """
+    term = found.model.term
+    width = uncertainty.student_quantile(0.975, uncertainty.COSINES)
+    reach = width * np.sqrt(np.diagonal(matrix)[len(alpha) :])
+    sized = (any(abs(alpha[j]) > half[j] for j in some) for some in changed_columns(term))
+    shapes = zip(term.nonlinear, beta, reach, sized, strict=True)
+    return sum(p.logarithmic and size and bool(far >= value) for p, value, far, size in shapes)
+
+
 def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
     """The standard error, s, of the moment at which the force acts.
 
@@ -149,9 +169,16 @@ def _by_velocity(found: Identified, row: int) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0) * np.array(powers)
 
 
-STRUCTURE, ONE_SPEED, GAIN, NEGATIVE, LATE = map(
+STRUCTURE, ONE_SPEED, GAIN, NEGATIVE, LATE, SHAPE = map(
     checks.NAMES.index,
-    ("structure_left", "one_speed", "velocity_gain", "negative_parameter", "force_late"),
+    (
+        "structure_left",
+        "one_speed",
+        "velocity_gain",
+        "negative_parameter",
+        "force_late",
+        "shape_unknown",
+    ),
 )
 
 
