@@ -55,6 +55,7 @@ from jaxfric.explanation import (
 )
 from jaxfric.explanation.figures import Figures
 from jaxfric.explanation.finding import Finding
+from jaxfric.explanation.friction_at_rest import beside_rest
 from jaxfric.explanation.inputs import interpolated
 from jaxfric.explanation.motion import motion_of
 from jaxfric.explanation.sentences import sentence
@@ -2150,12 +2151,11 @@ def test_friction_at_rest_is_up_to_twice_that_in_the_slowest_row(seen, expected)
 
 def test_what_a_law_adds_to_dry_friction():
     both = models.gaussian() + terms.FrictionAsymmetry() + terms.Generalised()
-    moved = types.SimpleNamespace(both_ways=True)
-    bumps, dry = regression._friction([both, terms.PowerLaw()], moved)
+    bumps, dry = beside_rest([both, terms.PowerLaw()], both_ways=True)
     names = [p.name for p in both.affine]
     assert [n for n, bump in zip(names, bumps[:-1], strict=True) if bump] == [
         "stribeck_force+", "stribeck_force-", "stribeck_force",
     ]  # fmt: skip
     level = dict(zip(names, dry[:-1], strict=True))
     assert {n: level[n] for n in names if level[n]} == {"coulomb+": 0.5, "coulomb-": 0.5}
-    assert not regression._friction([both], types.SimpleNamespace(both_ways=False))[1].any()
+    assert not beside_rest([both], both_ways=False)[1].any()

@@ -9,7 +9,7 @@ import pytest
 import jaxfric as jf
 from jaxfric import programs
 from jaxfric.data.recording import uniform
-from jaxfric.explanation import regression
+from jaxfric.explanation import friction_at_rest
 from jaxfric.simulation.errors import force_error
 
 UNITS = (("m", "N"), ("rad", "N·m"), ("m", "A"), ("mm", "kN"))
@@ -92,7 +92,7 @@ def test_what_friction_is_beside_zero_velocity_is_one_program(lowered):
     programs.quick_options()
     term = jf.models.gaussian()
     form = jax.tree.structure(term), tuple(map(np.shape, jax.tree.leaves(term)))
-    bumps, dry = regression._bumps_and_dry.__wrapped__(*form)
+    bumps, dry = friction_at_rest._bumps_and_dry.__wrapped__(*form)
     assert len(lowered) <= 1
     assert bumps.shape == dry.shape == (len(term.affine),)
     assert (bumps > 0).any() and (dry[bumps != 0] == 0).all() and (dry > 0).any()
