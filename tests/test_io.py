@@ -175,6 +175,50 @@ def test_heads_of_tables(tmp_path, head, names, notes):
     assert [note[: len(want)] for note, want in zip(table.notes, notes, strict=True)] == notes
 
 
+ABOVE = {
+    "nothing": [],
+    "a line": ["Export, version 3,2, of the drive"],
+    "filled": ["Protokoll", "Datum:{d}14.03.2024{d}", "Prüfer:{d}Möller, K.{d}"],
+}
+
+
+HEADS = [(above, True, units) for above in ABOVE for units in (False, True)]
+
+
+@pytest.mark.parametrize("above, named, units", [("nothing", False, False), *HEADS])
+@pytest.mark.parametrize(
+    "delimiter, decimal",
+    [
+        (";", ","),
+        (";", "."),
+        ("\t", ","),
+        ("\t", "."),
+        ("|", ","),
+        (",", "."),
+        (" ", ","),
+        (" ", "."),
+    ],
+)
+def test_the_delimiter_is_the_one_that_leaves_numbers(
+    tmp_path, above, named, units, delimiter, decimal
+):
+    names = ["t", "x", "v", "f", "temp"]
+    values = np.round(np.random.default_rng(3).normal(size=(30, 5)), 3)
+    values[:, 0], values[3, 4] = np.arange(30) / 1000, 24
+    rows = [delimiter.join(f"{x:.3f}".replace(".", decimal) for x in row) for row in values]
+    head = [line.format(d=delimiter) for line in ABOVE[above]]
+    head += [delimiter.join(names)] * named
+    head += [delimiter.join(["s", "mm", "mm/s", "N", "°C"])] * units
+    (tmp_path / "log.csv").write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    table = load(tmp_path / "log.csv")
+    assert len(table.columns) == 5
+    np.testing.assert_array_equal(np.transpose(list(table.columns.values())), values)
+    if named:
+        assert [name.split(" [")[0] for name in table.columns] == names
+        assert all(name.endswith("]") for name in table.columns) == units
+    assert len(table.notes) == (above != "nothing")
+
+
 def test_a_text_among_the_numbers_is_no_head(tmp_path):
     (tmp_path / "log.csv").write_text("t;x;f\n0;off;1\n" + ROWS)
     assert list(load(tmp_path / "log.csv").columns) == ["t", "x", "f"]
