@@ -35,6 +35,7 @@ _SYNONYMS = {
     "segment": "segment seg segmentid segmentindex run runid trial episode",
     "neighbour_velocity": "neighbourvelocity neighborvelocity",
 }
+MOTION = frozenset({"position", "velocity"})
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
 _MEASURED = frozenset(
     "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
@@ -195,17 +196,21 @@ def assign(
     columns: Mapping[str, str | None] | None,
     source: str,
     set_point: bool = False,
+    motion: bool = True,
 ) -> dict[str, str]:
     """Role to column name: what the user says first, then the usual synonyms.
 
     **Arguments:** `names`, the columns that the file has; `columns`, role to column name as
     given by the user, where an empty name leaves the role out; `source`, for messages;
-    `set_point`, whether the time and a reference, a position or a force are enough.
+    `set_point`, whether the time and a reference, a position or a force are enough; `motion`,
+    whether a position or velocity is needed: one that the user names may be absent without.
 
     **Raises:** `ValueError` if a named column is absent, if two columns stand for one role, or
     if time, force, or both position and velocity are missing.
     """
     names, columns = list(names), dict(columns or {})
+    if not motion:
+        columns = {r: n for r, n in columns.items() if r not in MOTION or n in names}
     chosen = {role: _find(names, name, role, source) for role, name in columns.items() if name}
     candidates: dict[str, list[str]] = {}
     for name in names:
@@ -228,7 +233,7 @@ def assign(
         chosen[role] = found[0]
     if set_point and "time" in chosen and {"reference", "position", "force"} & set(chosen):
         return chosen
-    _check_needed(chosen, names, source)
+    _check_needed(chosen, names, source, motion)
     return chosen
 
 
@@ -244,9 +249,9 @@ def _find(names: list[str], name: str, role: str, source: str) -> str:
     )
 
 
-def _check_needed(chosen: Mapping[str, str], names: list[str], source: str) -> None:
+def _check_needed(chosen: Mapping[str, str], names: list[str], source: str, motion: bool) -> None:
     missing = [role for role in ("time", "force") if role not in chosen]
-    if "position" not in chosen and "velocity" not in chosen:
+    if motion and not MOTION & set(chosen):
         missing.append("position")
     if missing:
         wanted = ["position or velocity" if role == "position" else role for role in missing]
