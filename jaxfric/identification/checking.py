@@ -46,8 +46,8 @@ def looked_at(
 def checked(
     found: Identified, design: Design, recording: Recording, faults: np.ndarray
 ) -> Identified:
-    """What was identified with its warnings, and with the error that a late force makes in its
-    covariance; a severe warning makes a row contradictory.
+    """What was identified with its warnings, and with the error that a late force makes, to first
+    order, in its covariance; a severe warning makes a row contradictory.
 
     `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
     """
@@ -73,21 +73,21 @@ def checked(
     suspect = checks.suspects(designs, errors, looks, fits)
     for i, (fit, error) in enumerate(zip(fits, errors, strict=True)):
         alpha, half, interval, late, _ = fit
-        if late is not None:
-            shift = designs.shift[i] * _unsure(late, interval, delayed)
-            matrices[i] += np.outer(shift, shift)
+        fitted = checks.places({})
         if suspect[i]:
             fitted = checks.fitted(row_of(designs, i), float(error), fit)
             warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
+        # A force that is late by cycles bends the curve, too.
+        late_force = not np.isnan(fitted[LATE])
+        if unsure := abs(fitted[LATE]) if late_force else _unsure(late, interval, delayed):
+            shift = designs.shift[i] * unsure
+            matrices[i] += np.outer(shift, shift)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
-        told = suspect[i] and not np.isnan(fitted[STRUCTURE])
-        if logs.position is not None and not told:
+        if logs.position is not None and np.isnan(fitted[STRUCTURE]):
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
-        # A force that is late by cycles bends the curve, too.
-        late_force = suspect[i] and not np.isnan(fitted[LATE])
         if not late_force and (missed := checks.misfit(row_of(designs, i))):
             warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
@@ -128,12 +128,14 @@ def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passi
     return int(np.sum((alpha + half)[counted] < 0))
 
 
-def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
+def _unsure(late: checks.Lateness | None, interval: float, delayed: bool) -> float:
     """The standard error, s, of the moment at which the force acts.
 
     Whether it is held or its stamp is right is not known: all of a sure lateness is an error. Where
     a delay was found, that it was found is.
     """
+    if late is None:
+        return 0.0
     return abs(late.time) if late.sure(interval) else late.error if delayed else 0.0
 
 

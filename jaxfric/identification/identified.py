@@ -97,7 +97,8 @@ class Identified(eqx.Module):
 
     - `model`: the sum with its parameters, a [`Model`][jaxfric.models.Model].
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible. Outside of `jax.jit` it
-      holds what a force that acts up to one and a half samples late makes of the parameters.
+      holds what a force that acts up to one and a half samples late makes of the parameters, and
+      one that a warning says is later (`force_late`), to first order.
     - `result`: a member of [`Result`][].
     - `windows`, `covered`: how many windows were used and which share of the slip they hold: of its
       time or, in closed windows, the root of that of its squared speed in one direction, whichever

@@ -50,7 +50,13 @@ def identification(
     return text(identified(document, truth, automatic))
 
 
-def _when(delay: float) -> str:
+def _when(delay: float, late: bool) -> str:
+    """When the force acts; `late`, whether a warning says that it is later than that."""
+    if late and not delay:
+        return (
+            "The delay told above is more than --align (align=True) corrects, one and a half "
+            "samples: the force was taken at its time stamps."
+        )
     if not delay:
         return "The force acts at its time stamp, as far as the log shows."
     span, late = f"{1e3 * abs(delay):.3g} ms", "after" if delay > 0 else "before"
@@ -66,7 +72,8 @@ def identified(
     result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
     if delay := document.get("model", {}).get("force_delay"):
-        told.append(_when(delay["value"]))
+        late = any(warning["name"] == "force_late" for warning in document.get("warnings", []))
+        told.append(_when(delay["value"], late))
     for evidence in ("constant_velocity", "breakaway"):
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
