@@ -425,6 +425,7 @@ def test_a_direction_that_never_moved_is_named():
     found = jf.identify("gaussian", dataclasses.replace(forward, num_segments=None))
     assert found.result_name == "not_excited"
     names = "coulomb-, viscous-, stribeck_force-, stribeck_velocity-"
+    assert found.diagnosis.startswith("This recording does not determine all parameters")
     assert f"Not determined: {names}." in found.diagnosis
 
 
