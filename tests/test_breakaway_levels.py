@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.identification.breakaway import breakaway, sentence
+from jaxfric.identification.breakaway import Curve, Transition, _level, breakaway, sentence
 from jaxfric.looks import drawing
 from tests.test_breakaway import axis
 
@@ -77,6 +77,15 @@ def test_a_recording_without_a_dwell_says_so():
     test = breakaway(recording, jf.identify("coulomb-viscous", recording))
     assert not test.levels and "dwell" in test.why and "dwell" in repr(test)
     assert sentence(test, {"force": "N", "position": "m"}) == ""
+
+
+def test_levels_that_scatter_down_to_zero_are_none():
+    curve = Curve(*(np.full(2, x) for x in (0.0, 15.0, 14.0, 16.0)))
+    alike = [Transition(0.0, -1, 1.0, x, x - 1, x + 1) for x in (14.0, 15.0, 16.0)]
+    level = _level(alike, -1, curve)
+    assert level.high == pytest.approx(-14 + 4.303 / 3**0.5, rel=1e-3) and level.transitions == 3
+    apart = [each._replace(value=v) for each, v in zip(alike, (3.0, 15.0, 60.0), strict=True)]
+    assert _level(apart, -1, curve) is None
 
 
 @pytest.mark.slow

@@ -374,9 +374,12 @@ def stamped(late=0):
 @pytest.mark.parametrize("late", [-3, 2, 4])
 def test_a_force_that_is_late_by_cycles_is_told(late, align):
     """Beside friction and slow motion it is a small part of the force, and yet all that is left."""
-    (remark,) = jf.identify("coulomb-viscous", stamped(late), align=align).remarks
+    found = jf.identify("coulomb-viscous", stamped(late), align=align)
+    (remark,) = found.remarks
     assert remark.name == "force_late"
     assert float(remark.text.split()[1]) == pytest.approx(late / 250, rel=0.4)
+    assert off(found).max() < 1.2  # to first order
+    assert ("more than --align (align=True) corrects" in " ".join(repr(found).split())) == align
 
 
 @pytest.mark.slow
@@ -442,6 +445,7 @@ def test_a_direction_that_never_moved_is_named():
     found = jf.identify("gaussian", dataclasses.replace(forward, num_segments=None))
     assert found.result_name == "not_excited"
     names = "coulomb-, viscous-, stribeck_force-, stribeck_velocity-"
+    assert found.diagnosis.startswith("This recording does not determine all parameters")
     assert f"Not determined: {names}." in found.diagnosis
 
 

@@ -175,6 +175,50 @@ def test_heads_of_tables(tmp_path, head, names, notes):
     assert [note[: len(want)] for note, want in zip(table.notes, notes, strict=True)] == notes
 
 
+ABOVE = {
+    "nothing": [],
+    "a line": ["Export, version 3,2, of the drive"],
+    "filled": ["Protokoll", "Datum:{d}14.03.2024{d}", "Prüfer:{d}Möller, K.{d}"],
+}
+
+
+HEADS = [(above, True, units) for above in ABOVE for units in (False, True)]
+
+
+@pytest.mark.parametrize("above, named, units", [("nothing", False, False), *HEADS])
+@pytest.mark.parametrize(
+    "delimiter, decimal",
+    [
+        (";", ","),
+        (";", "."),
+        ("\t", ","),
+        ("\t", "."),
+        ("|", ","),
+        (",", "."),
+        (" ", ","),
+        (" ", "."),
+    ],
+)
+def test_the_delimiter_is_the_one_that_leaves_numbers(
+    tmp_path, above, named, units, delimiter, decimal
+):
+    names = ["t", "x", "v", "f", "temp"]
+    values = np.round(np.random.default_rng(3).normal(size=(30, 5)), 3)
+    values[:, 0], values[3, 4] = np.arange(30) / 1000, 24
+    rows = [delimiter.join(f"{x:.3f}".replace(".", decimal) for x in row) for row in values]
+    head = [line.format(d=delimiter) for line in ABOVE[above]]
+    head += [delimiter.join(names)] * named
+    head += [delimiter.join(["s", "mm", "mm/s", "N", "°C"])] * units
+    (tmp_path / "log.csv").write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    table = load(tmp_path / "log.csv")
+    assert len(table.columns) == 5
+    np.testing.assert_array_equal(np.transpose(list(table.columns.values())), values)
+    if named:
+        assert [name.split(" [")[0] for name in table.columns] == names
+        assert all(name.endswith("]") for name in table.columns) == units
+    assert len(table.notes) == (above != "nothing")
+
+
 def test_a_text_among_the_numbers_is_no_head(tmp_path):
     (tmp_path / "log.csv").write_text("t;x;f\n0;off;1\n" + ROWS)
     assert list(load(tmp_path / "log.csv").columns) == ["t", "x", "f"]
@@ -723,7 +767,10 @@ def test_delta_servo_and_ur10e():
         ("time,position,force", {}, "force as N and position as m"),
         ("time,velocity,force [N]", {}, "position as m"),
         ("time,position [mm],force [N]", {}, None),
-        ("time,position,torque", {}, None),
+        ("time,position,torque", {}, "named: position as rad (else --units position=UNIT)"),
+        ("time,position [rad],torque", {}, None),
+        ("t,q,tau", {}, "force as N·m and position as rad"),
+        ("t,q,f", {}, "force as N and position as m"),
         ("time,position,current", {"units": {"position": "rad"}}, None),
     ],
 )
@@ -733,6 +780,33 @@ def test_a_unit_that_nothing_names_is_said(tmp_path, head, options, said):
     path.write_text(f"{head}\n{rows}\n")
     _, notes = io.read_with_notes(path, served=True, **options)
     assert said in notes[0] if said else "No unit is named" not in notes[0]
+
+
+@pytest.mark.parametrize(
+    "head, options, force, position",
+    [
+        ("t,q,tau", {}, "N·m", "rad"),
+        ("t,theta,tau_measured", {}, "N·m", "rad"),
+        ("t,q [deg],tau", {}, "N·m", "deg"),
+        ("t,omega,tau", {}, "N·m", "rad"),
+        ("t,q,tau", {"units": {"position": "rev"}}, "N·m", "rev"),
+        # straight, or in the user's own units
+        ("t,x,tau", {}, "N", "m"),
+        ("t,q [mm],tau", {}, "N", "mm"),
+        ("t,q,qd [m/s],tau", {}, "N", "m"),
+        ("t,q,tau", {"units": {"position": "m"}}, "N", "m"),
+        ("t,q,tau", {"scale": {"position": 0.01}}, "N", "m"),
+        ("t,q,tau", {"scale": {"force": 0.01}}, "N", "m"),
+        ("t,q,f", {}, "N", "m"),
+        ("t,q,current", {}, "A", "m"),
+    ],
+)
+def test_a_force_called_tau_is_a_torque(tmp_path, head, options, force, position):
+    path = tmp_path / "log.csv"
+    path.write_text(
+        f"{head}\n" + "".join(f"{0.01 * i}{',1' * head.count(',')}\n" for i in range(20))
+    )
+    assert io.read(path, **options).unit_names == {"force": force, "position": position}
 
 
 # ---- what is no log of one axis ----

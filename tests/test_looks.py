@@ -15,6 +15,7 @@ from hypothesis import given, strategies
 
 import jaxfric as jf
 from jaxfric.explanation.finding import Finding
+from jaxfric.identification import tabulate
 from jaxfric.identification.documents import to_json
 from jaxfric.identification.identified import result_names
 from jaxfric.looks import drawing, html, text
@@ -143,6 +144,16 @@ def test_a_fit_prints_model_parameters_and_how_it_ended(fit):
         f"filtered force error {float(fit.filtered_force_error):.2%}   result successful" in printed
     )
     assert max(map(len, printed.splitlines())) <= text.WIDTH
+
+
+@pytest.mark.parametrize("error, told", [(0.01, False), (0.17, True), (None, False)])
+def test_a_filter_that_reaches_over_rest_is_said(error, told):
+    document = {
+        "force_error": 0.02, "filtered_force_error": error, "filter_half_width": 0.12,
+    }  # fmt: skip
+    printed = tabulate._errors(document)
+    assert printed.startswith("force error 2.00%; filtered force error")
+    assert ("(240 ms, which reach over reversals and rest)" in printed) == told
 
 
 def test_the_interval_printed_is_that_of_the_estimate(fit):

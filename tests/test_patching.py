@@ -17,6 +17,7 @@ from jaxfric.data.tables import load
 from jaxfric.export.callback import callback
 from jaxfric.export.held import kept
 from jaxfric.simulators import Mujoco
+from jaxfric.simulators.actuation import passive
 from jaxfric.simulators.patching import patched
 
 mujoco = pytest.importorskip("mujoco")
@@ -206,12 +207,33 @@ def test_a_joint_without_a_force_is_told_and_one_that_no_log_knows_stands(tmp_pa
     found = logged(named(tmp_path, "time,hip_position,hip_torque,knee_position"), ["hip", "knee"])
     assert found.chosen == ["hip"] and found.still == []
     assert "log0.csv: there is no force of the joint knee" in found.without["knee"]
+    log = named(tmp_path, "time,hip_position,hip_torque,knee_position")
+    found = logged(log, ["hip", "knee"], {"knee"})
+    assert "No actuator of the model drives the joint knee" in found.without["knee"]
     found = logged(named(tmp_path, "time,hip_position,hip_torque"), ["hip", "knee"])
     assert found.chosen == ["hip"] and found.still == ["knee"] and not found.without
     # A position that is no joint's may be its, and a force is of a joint that moves.
     for more in ("link_position", "knee_torque"):
         found = logged(named(tmp_path, f"time,hip_position,hip_torque,{more}"), ["hip", "knee"])
         assert found.still == []
+
+
+@pytest.mark.parametrize(
+    "actuators, undriven",
+    [
+        ('<motor joint="cart"/>', {"pole"}),
+        ('<motor joint="cart"/><position jointinparent="pole"/>', set()),
+        ('<motor joint="cart"/><motor site="tip"/>', set()),  # which may drive any joint
+        ("", set()),
+    ],
+)
+def test_a_joint_that_no_actuator_drives_is_passive(actuators, undriven):
+    model = mujoco.MjModel.from_xml_string(
+        '<mujoco><worldbody><body><joint name="cart" type="slide" axis="1 0 0"/><geom size="1"/>'
+        '<body><joint name="pole"/><geom size="1"/><site name="tip"/></body></body></worldbody>'
+        f"<actuator>{actuators}</actuator></mujoco>"
+    )
+    assert passive(mujoco, model, ["cart", "pole"]) == undriven
 
 
 def test_a_name_that_is_no_joint_and_a_file_without_joints_are_refused(tmp_path):

@@ -7,12 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxfric import cli, explain, models, predict, simulators, terms
+from jaxfric import Recording, cli, explain, models, predict, simulators, terms
 from jaxfric.cli.arguments import whole
 from jaxfric.cli.joint_columns import logged
 from jaxfric.cli.robot_joints import opened
+from jaxfric.data import io
 from jaxfric.explanation.mismatch import fewest
-from jaxfric.simulators import Known, Mujoco
+from jaxfric.simulators import Known, Mujoco, same_motion
 from jaxfric.terms import KNOWN_FORCE, KNOWN_FRICTION
 from jaxfric.terms.effects import EFFECTS
 from tests.test_explain import CASES, PARAMETERS, healthy, planted
@@ -231,6 +232,44 @@ def test_the_command_takes_the_force_from_a_file(healthy, tmp_path, capsys):
     swapped = ["--simulation", ours[0], "--simulation-holdout", ours[0], "--holdout", logs[1]]
     assert cli.main(["explain", logs[0], *swapped]) == 2
     assert "is not the motion of" in capsys.readouterr().err
+
+
+def still(path, time, force, names="time_s,torque_Nm"):
+    rows = np.stack([time, force], axis=1)
+    np.savetxt(path, rows, delimiter=",", header=names, comments="", fmt="%.6g")
+    return str(path)
+
+
+def test_a_simulators_force_alone_is_along_the_recorded_motion(tmp_path):
+    t = np.arange(300) / 100
+    log = Recording(
+        time=t, position=np.sin(t), force=np.cos(t), source="log.csv",
+        units=(("force", "N·m"), ("position", "deg")),
+    )  # fmt: skip
+    path = still(tmp_path / "sim.csv", t + 1e-3, 2 * np.cos(t))
+    given = {"columns": {"position": "angle"}, "scale": {"position": 0.1}, "period": {}}
+    found = io.read_with_notes(path, along=log, **given)[0]
+    assert same_motion(log, found)
+    assert found.unit_names == log.unit_names
+    np.testing.assert_allclose(found.force, 2 * np.cos(t), atol=1e-5)
+    with pytest.raises(ValueError, match=r"sim.csv: .* 299 samples are not the 300 of log.csv"):
+        io.read_with_notes(still(path, t[:-1], t[:-1]), along=log)
+    with pytest.raises(ValueError, match=r"sim.csv: .* stamps are up to 5 s off those of log.csv"):
+        io.read_with_notes(still(path, t + 5, np.cos(t)), along=log)
+    with pytest.raises(ValueError, match=r"recognised as force. .*--columns force=NAME"):
+        io.read_with_notes(still(path, t, t, "time,value"), along=log)
+
+
+@pytest.mark.slow
+def test_the_command_takes_a_file_of_time_and_force(healthy, tmp_path):
+    log, run = tmp_path / "log.csv", healthy[0]
+    written(log, run, run.force)
+    sim = still(tmp_path / "sim.csv", run.time[:6000], simulator()(run)[:6000], "time,force")
+    out = tmp_path / "out.json"
+    assert cli.main(["explain", str(log), "--simulation", sim, "--json", str(out)]) == 0
+    document = json.loads(out.read_text())
+    assert document["baseline"]["name"] == "simulator"
+    assert document["verdict"] == "consistent"
 
 
 def test_options_that_do_not_go_together_are_refused(tmp_path, capsys):

@@ -248,8 +248,9 @@ KINDS = (
         "force_late",
         False,
         "Taken {value:.3g} s earlier (later, if negative), the force leaves half as much beyond "
-        "the noise: force and motion were logged with different delays. Shift one of them; jaxfric "
-        "explain tells more.",
+        "the noise: force and motion were logged with different delays, or one of them through a "
+        "filter. The intervals hold, to first order, what that makes of the parameters. Shift one "
+        "of them; jaxfric explain tells more.",
     ),
     Kind(
         "force_stamped",

@@ -109,7 +109,8 @@ def _add_baseline(command) -> None:
         "--simulation",
         metavar="FILE",
         help="instead: your own simulator's force along the recorded motion, sample by sample, "
-        "which stands as it is; or its run of the same reference, which a model is fitted to",
+        "which stands as it is (time and force will do, with the log's time stamps); or its run of "
+        "the same reference, which a model is fitted to",
     )
     base.add_argument(
         "--mujoco",

@@ -125,7 +125,7 @@ def _simulation(
     arguments: Namespace, recording: Recording, holdout: Recording | None
 ) -> Recording | Known:
     """Another simulator's force along the recorded motion, or its run of the same reference."""
-    ours = _beside(arguments.simulation, recording, arguments)[0]
+    ours = _beside(arguments.simulation, recording, arguments, along=recording)[0]
     if not same_motion(recording, ours):
         if arguments.simulation_holdout:
             raise ValueError(
@@ -138,7 +138,7 @@ def _simulation(
         return Known(ours.force)
     if not arguments.simulation_holdout:
         return ours
-    theirs = _beside(arguments.simulation_holdout, recording, arguments)[0]
+    theirs = _beside(arguments.simulation_holdout, recording, arguments, along=holdout)[0]
     if not same_motion(holdout, theirs):
         raise ValueError(
             f"{arguments.simulation_holdout}: this is not the motion of {arguments.holdout}. "
@@ -147,10 +147,14 @@ def _simulation(
     return Known(ours.force, theirs.force)
 
 
-def _beside(path: str, recording: Recording, arguments: Namespace) -> tuple[Recording, list[str]]:
-    """Another recording of the comparison, in the units of the first, and its notes."""
+def _beside(
+    path: str, recording: Recording, arguments: Namespace, along: Recording | None = None
+) -> tuple[Recording, list[str]]:
+    """Another recording of the comparison, in the units of the first, and its notes; of time and
+    force alone where it is `along` one.
+    """
     scale = arguments.scale | arguments.other_scale
-    other, notes = read(path, arguments, scale=scale)
+    other, notes = read(path, arguments, scale=scale, along=along)
     units = recording.unit_names
     scaled = {role: units[role] for role in arguments.other_scale if role in units}
     other = dataclasses.replace(other, units=tuple((other.unit_names | scaled).items()))

@@ -1,7 +1,7 @@
 """Which joints of a simulator a robot's logs hold, and what is wrong with how they are named."""
 
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,8 +27,12 @@ class Logged(NamedTuple):
     still: list[str]
 
 
-def logged(arguments: Namespace, joints: Sequence[str]) -> Logged:
+def logged(
+    arguments: Namespace, joints: Sequence[str], passive: Collection[str] = frozenset()
+) -> Logged:
     """The joints that the recording, and the held-out one, have columns of.
+
+    **Arguments:** `passive`, the joints that no actuator of the model drives.
 
     **Raises:** `ValueError`, naming the file, where there is none.
     """
@@ -58,8 +62,7 @@ def logged(arguments: Namespace, joints: Sequence[str]) -> Logged:
             )
     chosen = [joint for joint in wanted if all(joint in own for own in able)]
     without = {
-        joint: f"{path}: there is no force of the joint {joint} in this log, so that nothing is "
-        f"said of it. Name its column: --columns {joint}_force=NAME."
+        joint: _unforced(path, joint, joint in passive)
         for joint in wanted
         for path, each in zip(paths, columns, strict=True)
         if joint in each and not _forced(each, joint)
@@ -71,6 +74,19 @@ def logged(arguments: Namespace, joints: Sequence[str]) -> Logged:
     open_ = any(unclaimed(own, each) for own, each in zip(names, columns, strict=True))
     still = [] if open_ else [joint for joint in joints if joint not in known]
     return Logged(chosen, columns, without, still)
+
+
+def _unforced(path: str, joint: str, passive: bool) -> str:
+    if passive:
+        return (
+            f"No actuator of the model drives the joint {joint}, and {path} has no force of it: a "
+            "passive joint. The other joints are judged along its motion; its own friction, "
+            f"damping and stiffness are not judged. If it is driven: --columns {joint}_force=NAME."
+        )
+    return (
+        f"{path}: there is no force of the joint {joint} in this log, so that nothing is said of "
+        f"it. Name its column: --columns {joint}_force=NAME."
+    )
 
 
 def _forced(columns: Mapping[str, Mapping[str, str]], joint: str) -> bool:

@@ -16,6 +16,7 @@ from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
 from ..simulators import elastic
+from ..simulators.actuation import passive
 from ..simulators.loading import is_hinge, joints_of, library, read as read_model
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import joint_columns, robot_text
@@ -62,10 +63,11 @@ def _explained(arguments: Namespace, mujoco: Any, model: Any, joints: list[str])
     a transmission gives.
     """
     paths = [arguments.file, *([arguments.holdout] if arguments.holdout else [])]
-    logged = joint_columns.logged(arguments, joints)
+    names = joints_of(mujoco, model)
+    logged = joint_columns.logged(arguments, joints, passive(mujoco, model, names))
     joint_columns.check_save(arguments.save, logged.chosen)
     shared: dict[bytes, Any] = {}
-    numbers = {name: i for i, name in enumerate(joints_of(mujoco, model))}
+    numbers = {name: i for i, name in enumerate(names)}
     hinges = {name: is_hinge(mujoco, model, numbers[name]) for name in joints}
     with working(f"explaining {arguments.file}") as doing:
 

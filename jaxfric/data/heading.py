@@ -41,12 +41,10 @@ def dialect(lines: list[str], path: Path) -> Dialect:
             f"{path}: row {rows[0] + 1} has {len(lines[rows[0]])} characters, more than any row of "
             "a log. Is this text, with a line for each sample?"
         )
-    above = _above(lines, rows)
+    above, delimiter = _above(lines, rows)
     rows = rows[above:]
     notes = (f"{above} line{'s' * (above > 1)} above the table left out.",) if above else ()
-    top = lines[rows[0]]
-    delimiter = _delimiter(top)
-    cells = split(top, delimiter)
+    cells = split(lines[rows[0]], delimiter)
     if all(map(_is_number, cells)):
         comment = lines[rows[0] - 1].lstrip("# ") if rows[0] else ""
         header, first = split(comment, delimiter), rows[0]
@@ -61,21 +59,23 @@ def dialect(lines: list[str], path: Path) -> Dialect:
             first, rows = rows[1] + 1, rows[1:]
     data = rows[1] if len(rows) > 1 else rows[0]
     comma = any(re.match(r"\s*[-+]?\d+,\d+", cell) for cell in split(lines[data], delimiter))
-    decimal = "," if delimiter in (";", "\t", None) and comma else "."
+    decimal = "," if delimiter != "," and comma else "."
     return Dialect(unique(header), first, delimiter, decimal, notes)
 
 
-def _above(lines: list[str], rows: list[int]) -> int:
-    """How many lines of text stand above the names, in another number of cells than the table."""
+def _above(lines: list[str], rows: list[int]) -> tuple[int, str | None]:
+    """How many lines of text stand above the names, in another number of cells than the table,
+    and the delimiter: the one of the first samples, for text may hold any of them.
+    """
     for k, (row, below) in enumerate(zip(rows[:_ABOVE], rows[1:], strict=False)):
         delimiter = _delimiter(lines[below])
         cells, numbers = split(lines[row], delimiter), split(lines[below], delimiter)
         if len(cells) == len(numbers) > 1 and _is_row(numbers):
             if any(map(_is_number, cells)):
-                return 0
+                return 0, delimiter
             named = k and _are_units(cells, len(split(lines[rows[k - 1]], delimiter)))
-            return k - 1 if named else k
-    return 0
+            return (k - 1 if named else k), delimiter
+    return 0, _delimiter(lines[rows[0]])
 
 
 def _is_row(cells: list[str]) -> bool:
@@ -89,8 +89,17 @@ def _are_units(cells: list[str], count: int) -> bool:
 
 
 def _delimiter(line: str) -> str | None:
-    found = max(DELIMITERS, key=line.count)
-    return found if found in line else None
+    """What leaves the most of a line's cells numbers: `0,5;1,2` is two, or three of one number.
+
+    Of several the one that is there most often, and blanks last.
+    """
+
+    def numbers(delimiter: str | None) -> tuple[float, int]:
+        cells = [cell for cell in split(line, delimiter) if cell]
+        share = sum(map(_is_number, cells)) / max(len(cells), 1)
+        return share, line.count(delimiter) if delimiter else 0
+
+    return max([*(each for each in DELIMITERS if each in line), None], key=numbers)
 
 
 def split(line: str, delimiter: str | None) -> list[str]:

@@ -11,6 +11,7 @@ import jax
 import numpy as np
 
 from . import columns as names, stamps
+from .along import motion_of
 from .cleaning import Clean, clean
 from .clocked import CLOCK, clocked
 from .delimited import Table, numbers
@@ -101,6 +102,7 @@ def read_with_notes(
     counts_per_rev: float | None = None,
     set_point: bool = False,
     served: bool = False,
+    along: Recording | None = None,
 ) -> tuple[Recording, list[str]]:
     """[`read`][] together with one plain sentence for each thing that was put in order.
 
@@ -108,6 +110,9 @@ def read_with_notes(
 
     With `set_point` the file may hold what an axis should do instead of what it did: time and a
     reference, a position or a force are enough, and a force that is absent is zero.
+
+    With `along` time and force are enough where they are of the samples of that recording: the
+    motion is its own then.
 
     Row numbers in the notes count lines in a CSV file and samples, from 1, in the other formats.
     """
@@ -121,7 +126,10 @@ def read_with_notes(
     if rate is not None:
         table = clocked(table, rate, columns, source)
         columns = dict(columns or {}) | {"time": CLOCK}
-    chosen = names.assign(table.columns, columns, source, set_point)
+    chosen = names.assign(table.columns, columns, source, set_point, along is None)
+    if still := along is not None and not names.MOTION & set(chosen):
+        scale = {role: factor for role, factor in scale.items() if role not in names.MOTION}
+        units, period, counts_per_rev = along.unit_names | units, {}, None
     _check_arguments(chosen, scale, units, period, source)
     units = {role: unit_of(unit, role) or unit for role, unit in units.items()}  # `uNm` is µN·m
     if counts_per_rev is not None:
@@ -130,7 +138,7 @@ def read_with_notes(
     named = names.units(chosen, scale, units)
     time, counted, in_seconds = _time(table, chosen, scale, path)
     scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
-    notes = [names.served(chosen, scale, named, own)] if served else []
+    notes = [names.served(chosen, scale, units, own)] if served else []
     notes += table.notes + names.unknown_units(chosen, scale) + counted
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
@@ -150,6 +158,8 @@ def read_with_notes(
             scaled["position"] = scaled.get("reference", np.zeros_like(scaled["time"]))
     notes += tidy.notes
     scaled["time"] = _exact_time(scaled["time"], tidy.segment, notes, source)
+    if still:
+        scaled |= motion_of(along, scaled["time"], source)
     return _recording(tidy, scaled, named, path, source), notes
 
 

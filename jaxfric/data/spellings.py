@@ -76,6 +76,8 @@ FITTING = {
     | {"lbf", "kgf", "A", "mA", "µA", "V", "mV", "%", "‰"}
     | TORQUES,
 }
+# What a row of units may say of other columns.
+_OTHERS = frozenset("°c c degc celsius k kelvin °f degf - –".split())
 
 
 def apart(name: str) -> str:
@@ -84,8 +86,8 @@ def apart(name: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Whether a text is a unit of any signal."""
-    return any(unit_of(text, role) for role in FITTING)
+    """Whether a text is a unit of any signal, also of a temperature or of a column without one."""
+    return text.strip().lower() in _OTHERS or any(unit_of(text, role) for role in FITTING)
 
 
 def unit_of(text: str, role: str) -> str | None:

@@ -244,7 +244,9 @@ def _level(transitions, way: int, curve: Curve) -> Level | None:
     if len(own) > 1:
         error = float(np.std([each.value for each in own], ddof=1)) / len(own) ** 0.5
         scatter = student_quantile(0.975, len(own) - 1) * error
-    ends = sorted((float(way * max(low - scatter, 0.0)), float(way * (high + scatter))))
+    if low <= scatter:  # as of a single one: a level that may be none is not told
+        return None
+    ends = sorted((float(way * (low - scatter)), float(way * (high + scatter))))
     edge = sorted((float(way * curve.low[0]), float(way * curve.high[0])))
     end = float(way * curve.force[0])
     return Level(way, float(way * value), ends[0], ends[1], len(own), end, edge[0], edge[1])

@@ -12,7 +12,7 @@ import numpy as np
 from .. import checks, signals
 from ..checks import Design
 from ..data.recording import Recording, row_of
-from ..terms.base import changed_columns
+from ..terms.base import AbstractTerm, changed_columns
 from . import constant_load, uncertainty
 from .identified import Identified, Result, result_names
 
@@ -47,8 +47,8 @@ def looked_at(
 def checked(
     found: Identified, design: Design, recording: Recording, faults: np.ndarray
 ) -> Identified:
-    """What was identified with its warnings, and with the error that a late force makes in its
-    covariance; a severe warning makes a row contradictory.
+    """What was identified with its warnings, and with the error that a late force makes, to first
+    order, in its covariance; a severe warning makes a row contradictory.
 
     `faults`: those of the recording itself, by `checks.recorded`, `(W,)`, or `(B, W)` of a batch.
     """
@@ -75,26 +75,26 @@ def checked(
     suspect = checks.suspects(designs, errors, looks, fits)
     for i, (fit, error) in enumerate(zip(fits, errors, strict=True)):
         alpha, half, interval, late, _ = fit
-        if late is not None:
-            shift = designs.shift[i] * _unsure(late, interval, delayed)
-            matrices[i] += np.outer(shift, shift)
+        fitted = checks.places({})
         if suspect[i]:
             fitted = checks.fitted(row_of(designs, i), float(error), fit)
             warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
+        # A force that is late by cycles bends the curve, too.
+        late_force = not np.isnan(fitted[LATE])
+        if unsure := abs(fitted[LATE]) if late_force else _unsure(late, interval, delayed):
+            shift = designs.shift[i] * unsure
+            matrices[i] += np.outer(shift, shift)
         # Those told from zero, of the ones that no passive axis has below it.
         sure = [k for k in passive if abs(alpha[k]) > half[k]]
-        told = suspect[i] and not np.isnan(fitted[STRUCTURE])
-        if logs.position is not None and not told:
+        if logs.position is not None and np.isnan(fitted[STRUCTURE]):
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
-        # A force that is late by cycles bends the curve, too.
-        late_force = suspect[i] and not np.isnan(fitted[LATE])
         if not late_force and (missed := checks.misfit(row_of(designs, i))):
             warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
-        if open_shapes := _open_shapes(found, betas[i], matrices[i], alpha, half):
+        if open_shapes := _open_shapes(found.model.term, alpha, betas[i], matrices[i]):
             warnings[i, SHAPE] = open_shapes
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
             # What accelerates the axis there is noise.
@@ -133,27 +133,28 @@ def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passi
 
 
 def _open_shapes(
-    found: Identified, beta: np.ndarray, matrix: np.ndarray, alpha: np.ndarray, half: np.ndarray
+    term: AbstractTerm, alpha: np.ndarray, beta: np.ndarray, matrix: np.ndarray
 ) -> int:
     """How many ratio-scaled shapes are known no better than down to zero, of sizes that seem sure.
 
-    `beta`, `(d,)`; `matrix`, `(P, P)`; `alpha` and their `half` widths, `(p,)`. An interval is a
-    straight line's: so far from the value the size is another one.
+    Of parameters `alpha`, `(p,)`, and `beta`, `(d,)`, with their covariance, `(P, P)`. An interval
+    is a straight line's: so far from the value the size is another one.
     """
-    term = found.model.term
     width = uncertainty.student_quantile(0.975, uncertainty.COSINES)
-    reach = width * np.sqrt(np.diagonal(matrix)[len(alpha) :])
+    half, reach = np.split(width * np.sqrt(np.diagonal(matrix)), [len(alpha)])
     sized = (any(abs(alpha[j]) > half[j] for j in some) for some in changed_columns(term))
     shapes = zip(term.nonlinear, beta, reach, sized, strict=True)
     return sum(p.logarithmic and size and bool(far >= value) for p, value, far, size in shapes)
 
 
-def _unsure(late: checks.Lateness, interval: float, delayed: bool) -> float:
+def _unsure(late: checks.Lateness | None, interval: float, delayed: bool) -> float:
     """The standard error, s, of the moment at which the force acts.
 
     Whether it is held or its stamp is right is not known: all of a sure lateness is an error. Where
     a delay was found, that it was found is.
     """
+    if late is None:
+        return 0.0
     return abs(late.time) if late.sure(interval) else late.error if delayed else 0.0
 
 

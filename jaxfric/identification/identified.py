@@ -66,14 +66,15 @@ class Result(eqx.Enumeration):
         "The signals of the recording contradict each other, so that no parameter can be trusted."
     )
     not_excited = (
-        "Condition (15) fails: some columns are linearly dependent on this recording, so that the "
-        "parameters with infinite standard error are not determined. Move in both directions and "
-        "over a range of speeds, neither constant speed nor rest alone."
+        "This recording does not determine all parameters: the force of some is zero along it, or "
+        "others give the same (linearly dependent columns, condition (15) of Kim, Kim & Ha 2004). "
+        "Their standard error is infinite. Move in both directions and over a range of speeds, "
+        "neither constant speed nor rest alone."
     )
     open_windows = (
-        "Condition (14) fails: no window with equal end velocities lets the axis slip. Record "
-        "until the axis returns to a velocity that it had before (rest, or a whole period), or "
-        "use the weak form."
+        "The axis slips in no stretch that ends at the velocity at which it began, in which mass "
+        "and acceleration cancel (condition (14) of Kim, Kim & Ha 2004). Record until the axis "
+        "returns to a velocity that it had before (rest, or a whole period), or use the weak form."
     )
     no_slip = (
         "The axis never slips: its speed does not rise above its noise. Check the velocity or the "
@@ -97,7 +98,8 @@ class Identified(eqx.Module):
 
     - `model`: the sum with its parameters, a [`Model`][jaxfric.models.Model].
     - `covariance`: of `names`, shape `(P, P)`; infinite where not visible. Outside of `jax.jit` it
-      holds what a force that acts up to one and a half samples late makes of the parameters.
+      holds what a force that acts up to one and a half samples late makes of the parameters, and
+      one that a warning says is later (`force_late`), to first order.
     - `result`: a member of [`Result`][].
     - `windows`, `covered`: how many windows were used and which share of the slip they hold: of its
       time or, in closed windows, the root of that of its squared speed in one direction, whichever
@@ -201,7 +203,11 @@ class Identified(eqx.Module):
             return said
         names = f"Not determined: {', '.join(hidden)}."
         why = constant_load.twice(hidden)
-        return f"Condition (15) fails. {names} {why}" if why else f"{said} {names}"
+        return (
+            f"This recording does not determine all parameters. {names} {why}"
+            if why
+            else f"{said} {names}"
+        )
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

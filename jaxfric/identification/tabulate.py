@@ -50,11 +50,17 @@ def identification(
     return text(identified(document, truth, automatic))
 
 
-def _when(delay: float) -> str:
+def _when(delay: float, late: bool) -> str:
+    """When the force acts; `late`, whether a warning says that it is later than that."""
+    if late and not delay:
+        return (
+            "The delay told above is more than --align (align=True) corrects, one and a half "
+            "samples: the force was taken at its time stamps."
+        )
     if not delay:
         return "The force acts at its time stamp, as far as the log shows."
-    span, late = f"{1e3 * abs(delay):.3g} ms", "after" if delay > 0 else "before"
-    return f"The force acts {span} {late} its time stamp, which is taken into account."
+    span, side = f"{1e3 * abs(delay):.3g} ms", "after" if delay > 0 else "before"
+    return f"The force acts {span} {side} its time stamp, which is taken into account."
 
 
 def identified(
@@ -66,7 +72,8 @@ def identified(
     result = f"{_errors(document)}   result {document['result']}"
     told = [result, *([document["diagnosis"]] * (document["result"] != FINE)), *warnings(document)]
     if delay := document.get("model", {}).get("force_delay"):
-        told.append(_when(delay["value"]))
+        late = any(warning["name"] == "force_late" for warning in document.get("warnings", []))
+        told.append(_when(delay["value"], late))
     for evidence in ("constant_velocity", "breakaway"):
         if said := document.get(evidence, {}).get("summary"):
             told.append(said)
@@ -108,8 +115,11 @@ def _errors(document: Mapping[str, Any]) -> str:
     filtered = f"filtered force error {_percent(document['filtered_force_error'])}"
     if document["force_error"] is None:
         return filtered
-    span = 2e3 * document["filter_half_width"]
-    return f"force error {_percent(document['force_error'])}; {filtered} ({span:.3g} ms)"
+    span = f"{2e3 * document['filter_half_width']:.3g} ms"
+    # The force error counts samples in motion alone; of these a filter leaves less, not more.
+    if (document["filtered_force_error"] or 0.0) > document["force_error"]:
+        span += ", which reach over reversals and rest"
+    return f"force error {_percent(document['force_error'])}; {filtered} ({span})"
 
 
 def many(documents: Sequence[Mapping[str, Any]]) -> str:

@@ -5,7 +5,7 @@ F = g (k w + b₀ + b₁ l + b₂ dl/dt), w the command u, or what follows it as
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -93,6 +93,19 @@ def only(mujoco: Any, model: Any, joint: int) -> int | None:
         if int(model.actuator_trntype[i]) == kind and int(model.actuator_trnid[i, 0]) == joint
     ]
     return own[0] if len(own) == 1 else None
+
+
+def passive(mujoco: Any, model: Any, names: Sequence[str]) -> frozenset[str]:
+    """Which of a model's joints, in its order, no actuator drives where it drives others.
+
+    None where an actuator acts on something else than a joint, and may drive any of them; nor of a
+    model without actuators, which leaves open what drives it.
+    """
+    kinds = {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
+    if not model.nu or not {int(kind) for kind in model.actuator_trntype} <= kinds:
+        return frozenset()
+    driven = {int(each[0]) for each in model.actuator_trnid}
+    return frozenset(name for i, name in enumerate(names) if i not in driven)
 
 
 def label(model: Any, number: int) -> str:
