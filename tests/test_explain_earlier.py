@@ -14,7 +14,7 @@ from jaxfric.explanation.baseline import Baseline
 from jaxfric.explanation.evidence import gather
 from jaxfric.explanation.finding import Moved
 from jaxfric.explanation.mismatch import Mismatch
-from jaxfric.explanation.regression import fit
+from jaxfric.explanation.regression import fit, without_shapes
 from jaxfric.explanation.sentences import changed_sentence, parameter
 from jaxfric.identification.uncertainty import Estimate
 
@@ -124,6 +124,10 @@ def test_a_baseline_with_a_fine_wave_is_fitted_at_its_period():
     base = fit([whole], evidence, [None])
     assert base.betas[0][-1] == pytest.approx(0.01, rel=1e-4)
     assert base.energy < 1e-3 * float(evidence.target @ evidence.target)
+    # Looked for anew beside a candidate, its period is where it was.
+    assert np.array_equal(without_shapes(whole, base.betas[0]), base.betas[0])
+    bump = models.gaussian()
+    assert np.isnan(without_shapes(bump, np.array([0.02, 0.03]))).all()
 
 
 def test_values_that_the_earlier_recording_hardly_shows_tell_no_factor():

@@ -11,7 +11,7 @@ from .candidates import Candidate, CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
 from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
-from .regression import Fit, fit, gains
+from .regression import Fit, fit, gains, without_shapes
 from .scanning import scanned
 from .significance import DRAWS, LEVEL, NEW, BlockBootstrap, Scan, blocks, thresholds
 from .spectral_lines import fast_tone
@@ -341,8 +341,11 @@ def _afresh(seen, current, trial) -> list[Finalist]:
     the candidate as its grid has it, and the candidate's beside the base's in the middle.
     """
     base = current.terms[0]
+    anew = without_shapes(base, current.betas[0])
     middle = inside(base, seen.limits, np.full(len(base.nonlinear), 0.5))
-    starts = [(None, trial.beta), (middle, None)] if len(trial.beta) else [(None, trial.beta)]
+    starts: list[tuple[np.ndarray, np.ndarray | None]] = [(anew, trial.beta)]
+    if len(trial.beta):
+        starts.append((np.where(np.isnan(anew), middle, anew), None))
     terms, others = (*current.terms, trial.candidate.term), current.betas[1:]
     fits = (fit(terms, seen, [first, *others, last], 8) for first, last in starts)
     return [Finalist(0.0, trial, 1.0, each.energy, each.betas, each.alphas[-1]) for each in fits]

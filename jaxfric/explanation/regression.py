@@ -124,24 +124,22 @@ def fit(
 ) -> Fit:
     """The sum of terms that fits the rows best.
 
-    **Arguments:** `terms`; `evidence`; `start`, β of each term to begin from (`None`: scanned);
-    `beside`, an orthonormal basis of further columns that are fitted along, `(J, r)`: then the
-    result's columns and residual are what those leave.
+    **Arguments:** `terms`; `evidence`; `start`, β of each term to begin from, of which NaN is
+    looked for on a grid (`None`: all); `beside`, an orthonormal basis of further columns that are
+    fitted along, `(J, r)`: then the result's columns and residual are what those leave.
     """
     terms = tuple(terms)
     rows = Remembered(evidence if beside is None else Beside(evidence, beside))
     space = Space(terms, rows.limits)
     if not sum(space.counts):
         return _at(terms, rows, space, np.zeros(0), derivatives=True)
-    point = np.full(sum(space.counts), 0.5)
-    known = list(start) if start is not None else [None] * len(terms)
-    unknown = [i for i, b in enumerate(known) if b is None]
-    filled = [
-        p if b is None else b for b, p in zip(known, space.split(space.beta(point)), strict=True)
-    ]
-    point = space.point(np.concatenate(filled))
-    if unknown:
-        point = _scan(terms, rows, space, point, unknown)
+    given = start if start is not None else [None] * len(terms)
+    pairs = zip(given, space.counts, strict=True)
+    known = np.concatenate([np.full(count, np.nan) if b is None else b for b, count in pairs])
+    sought = np.isnan(known)
+    point = space.point(np.where(sought, space.beta(np.full(len(known), 0.5)), known))
+    if sought.any():
+        point = _scan(terms, rows, space, point, np.flatnonzero(sought))
     return _refine(terms, rows, space, point, iterations)
 
 
@@ -158,6 +156,13 @@ def gains(
         orthonormal(rows, basis).T @ left for some in parts for rows in evidence.columns(term, some)
     ]
     return np.array([np.sum(each**2) for each in own])
+
+
+def without_shapes(term: AbstractTerm, beta: np.ndarray) -> np.ndarray:
+    """β of a term, `(d,)`, with NaN for what [`fit`][] is to look for anew: all but the periods of
+    waves, which nothing beside them changes.
+    """
+    return np.where([parameter.repeats for parameter in term.nonlinear], beta, np.nan)
 
 
 def freed(current: Fit, free: Iterable[int]) -> Fit:
@@ -232,10 +237,9 @@ def _apart(changed: Sequence[range]) -> list[list[int]]:
     return groups
 
 
-def _scan(terms, evidence, space, point, unknown):
+def _scan(terms, evidence, space, point, free):
     """Coordinates found one after the other, each by a grid with the others held, twice over."""
     owner = np.repeat(np.arange(len(terms)), space.counts)
-    free = [i for i in range(len(point)) if owner[i] in unknown]
     done: dict[int, np.ndarray] = {}  # where the others were held at a parameter's last scan
     for _ in range(2 if len(free) > 1 else 1):
         for i in free:

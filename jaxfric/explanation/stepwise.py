@@ -14,7 +14,7 @@ from .intervals import left_out, left_out_again
 from .physical_constraints import constrained, nil, told_parts
 from .predictions import with_predictions
 from .problem import Problem
-from .regression import Fit, fit, without
+from .regression import Fit, fit, without, without_shapes
 from .rivals import simplest, with_rivals
 from .selection import SelectedTerm, Selection
 from .significance import blocks
@@ -200,7 +200,8 @@ def _pruned(
         less, trial = without(current, evidence, index), selected[index - start].trial
         if imitated(trial, current):
             others = [i for i in range(len(current.terms)) if i != index]
-            betas = [None, *(current.betas[i] for i in others[1:])]
+            anew = without_shapes(current.terms[0], current.betas[0])
+            betas = [anew, *(current.betas[i] for i in others[1:])]
             afresh = fit(less.terms, evidence, betas, 8)
             less = min(less, afresh, key=lambda each: each.energy)
         gain = 1 - current.energy / less.energy
