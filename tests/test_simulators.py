@@ -151,6 +151,11 @@ def test_a_baseline_without_it_does_not_read_the_simulators_force(healthy):
     assert ours.fit == theirs.fit and KNOWN_FORCE not in str(ours.model)
 
 
+def test_the_recorded_force_is_no_simulators(healthy):
+    with pytest.raises(ValueError, match="is the recorded force, to the last digit"):
+        explain(healthy[0], Known(healthy[0].force))
+
+
 def test_a_revolute_axis_has_gravity_and_a_spring_too():
     rotary = Known().model((("force", "N·m"), ("position", "rad")))
     assert {"gravity_sin", "gravity_cos", "stiffness", "gain"} <= set(rotary.parameters)

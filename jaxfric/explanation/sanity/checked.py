@@ -12,8 +12,9 @@ from ...checks import Remark
 from ...data.recording import Recording
 from ...identification.uncertainty import Estimate
 from ...simulation.errors import outliers
-from ...simulators import AbstractSimulator, Attribute, Mujoco
+from ...simulators import AbstractSimulator, Attribute, Known, Mujoco
 from ...simulators.columns import GAIN
+from ...terms import KNOWN_FORCE
 from ..explained import Explanation
 from ..figures import Figures, cast
 from ..finding import Finding
@@ -108,10 +109,26 @@ def check_logs(parts: Sequence[Part]) -> list[CheckedSimulator]:
 def check_log(
     recording: Recording, simulator: AbstractSimulator, holdout: Recording | None
 ) -> CheckedSimulator:
-    """The simulator of a recording by itself, looked at, if it is not yet."""
+    """The simulator of a recording by itself, looked at, if it is not yet.
+
+    **Raises:** `ValueError` if an axis hardly slips, or if the simulator's force is the recorded.
+    """
     if isinstance(simulator, CheckedSimulator):
         return simulator
+    if isinstance(simulator, Known):
+        _require_other(recording, simulator)
     return check_logs([Part(recording, holdout, simulator, getattr(simulator, "joint", ""))])[0]
+
+
+def _require_other(recording: Recording, simulator: Known) -> None:
+    """Raise `ValueError` if the force of a simulator from elsewhere is the recorded one."""
+    known = np.asarray(simulator.beside(recording).channels[KNOWN_FORCE], float)
+    mask = np.asarray(recording.mask)
+    if np.array_equal(known[mask], np.asarray(recording.force, float)[mask]):
+        raise ValueError(
+            f"The simulator's force for {recording.source or 'the recording'} is the recorded "
+            "force, to the last digit: the same column or file? Give what the simulator computes."
+        )
 
 
 def _cast(part: Part) -> Part:
