@@ -133,12 +133,15 @@ def test_two_springs_are_told_without_their_stiffness(answered):
 def test_a_second_spring_that_does_next_to_nothing_is_no_doubt_of_the_first(answered):
     with_it = joints(0.01, 0.003, 0.003)
     felt = frozenset({"shoulder"})
-    for more in (spring(0.4)._replace(joint="shoulder"), Suspicion("shoulder", "?", 0.6, felt)):
-        # Of the 0.2 % that the first leaves.
-        answer = answered(spring(0.998), None, more, again=with_it)
+    for more in (spring(0.4)._replace(joint="shoulder"), Suspicion("shoulder", "?", 0.4, felt)):
+        # Of the 6 % that the first leaves.
+        answer = answered(spring(0.94), None, more, again=with_it)
         assert 'name="elbow_elastic"' in answer.source
         assert effects(answer, "elbow") == [COMPLIANCE.name, MISMATCH]
         assert not any(joint.told.warnings for joint in answer.joints)
+    # Beside one that leaves less than any spring has to take no other one is looked for.
+    doubt = spring(1.0)._replace(joint="shoulder")
+    assert 'name="elbow_elastic"' in answered(spring(0.98), None, doubt, again=with_it).source
 
 
 def test_beside_a_doubtful_spring_no_value_is_sure_that_may_stand_for_it(answered):

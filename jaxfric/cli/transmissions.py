@@ -58,7 +58,7 @@ def with_springs(
     if (other := _once_more(again, found, text, arguments)) is not None:
         found = other
         again = _with_spring(answer, found, text, explained, arguments)
-    if again.open:
+    if again.open and not found.alone:
         doing("other transmissions")
         more = elastic_joint(_told(again), again.source, folder_of(arguments.mujoco))
         if more is not None and not found.stands_beside(more):

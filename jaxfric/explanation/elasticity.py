@@ -56,6 +56,11 @@ class ElasticJoint(NamedTuple):
         """What it says where values of the simulator explain as much with as few numbers."""
         return self._doubted("explains as much as what is named here")
 
+    @property
+    def alone(self) -> bool:
+        """Whether another spring could not take beside it what any has to take."""
+        return 1 - self.share < LEAST_SHARE
+
     def stands_beside(self, other: "ElasticJoint | Suspicion") -> bool:
         """Whether a spring that was found beside this one takes less than any spring has to take,
         of what no value explains without either.
