@@ -132,6 +132,32 @@ def test_the_table_has_what_the_file_leaves_by_itself():
     assert "callback" not in robot_text.joints("user.xml", "a.csv", [robot._row(joint(), None)])
 
 
+def test_the_table_says_where_an_unexplained_joint_errs_and_what_was_refuted():
+    places = ("velocity", 0.2, ""), ("force_rate", 0.31, "period 10.9 mm")
+    where = [dict(zip(("coordinate", "share", "detail"), each, strict=True)) for each in places]
+    some = {"backlash": None, "tooth_mesh": False, "cogging": False}
+    refused = [
+        Finding(name, "", "", (), "", {}, 0.1, None, 0.002, confirmed=confirmed)
+        for name, confirmed in some.items()
+    ]
+    elbow = joint("unexplained")
+    elbow.told.where, elbow.told.not_confirmed = where, refused
+    row = robot._row(elbow, None)
+    said = " ".join(robot_text.joints("user.xml", "a.csv", [row]).split())
+    assert (
+        "elbow: Not explained: most that the model leaves follows force rate (31%: period 10.9 "
+        "mm); it looks like backlash, with which the model is worse sample by sample; it looks "
+        "like tooth mesh and cogging, which the held-out recording does not confirm. More by "
+        "--joint elbow." in said
+    )
+    assert "see below" in said
+    elbow.told.where, elbow.told.not_confirmed = [], []
+    assert "no place stands out" in robot._row(elbow, None)["unexplained"]
+    elbow.told.findings.append(refused[0])
+    elbow.told.warnings.append({"name": "force_sign", "text": "Of another sign.", "severe": True})
+    assert "unexplained" not in robot._row(elbow, None)
+
+
 def test_which_number_would_be_below_zero_is_said():
     weight = Weight(1.5, np.array([0.13, 0.0, 0.0]), np.array([0.002, 0.012, 0.012]), np.eye(3))
     with pytest.raises(ValueError, match="inertia y would be below zero"):

@@ -121,7 +121,7 @@ def test_beside_a_spring_that_does_as_well_no_value_is_sure(answered):
 
 
 def test_two_springs_are_told_without_their_stiffness(answered):
-    other = spring(0.3)._replace(joint="shoulder")
+    other = spring(0.4)._replace(joint="shoulder")
     # Found; asked once more, the same; then another one beside it.
     answer = answered(spring(), None, other, again=joints(0.01, 0.003, 0.003))
     assert "elastic" not in answer.source and sure(answer) == [True, False, False]
@@ -130,8 +130,22 @@ def test_two_springs_are_told_without_their_stiffness(answered):
     assert "neither stiffness is told" in warning["text"]
 
 
+def test_a_second_spring_that_does_next_to_nothing_is_no_doubt_of_the_first(answered):
+    with_it = joints(0.01, 0.003, 0.003)
+    felt = frozenset({"shoulder"})
+    for more in (spring(0.4)._replace(joint="shoulder"), Suspicion("shoulder", "?", 0.4, felt)):
+        # Of the 6 % that the first leaves.
+        answer = answered(spring(0.94), None, more, again=with_it)
+        assert 'name="elbow_elastic"' in answer.source
+        assert effects(answer, "elbow") == [COMPLIANCE.name, MISMATCH]
+        assert not any(joint.told.warnings for joint in answer.joints)
+    # Beside one that leaves less than any spring has to take no other one is looked for.
+    doubt = spring(1.0)._replace(joint="shoulder")
+    assert 'name="elbow_elastic"' in answered(spring(0.98), None, doubt, again=with_it).source
+
+
 def test_beside_a_doubtful_spring_no_value_is_sure_that_may_stand_for_it(answered):
-    doubt = Suspicion("elbow", "its stiffness is not told", frozenset({"shoulder"}))
+    doubt = Suspicion("elbow", "its stiffness is not told", 0.6, frozenset({"shoulder"}))
     answer = answered(doubt)
     # The elbow hardly feels it, but says the same of its link.
     assert sure(answer) == [True, False, False]

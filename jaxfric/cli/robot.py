@@ -11,7 +11,7 @@ from ..data.targets import standard
 from ..explanation import Explanation
 from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..explanation.springs import DOUBTED
-from ..explanation.wording import HOLDS_MORE
+from ..explanation.wording import HOLDS_MORE, unexplained
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -139,8 +139,16 @@ def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
         "still": list(joint.still),
         "contradicted": [w["text"] for w in joint.told.warnings if w["name"] in DOUBTS],
+        **_unexplained(joint.told),
         **written,
     }
+
+
+def _unexplained(told: Explanation) -> dict[str, str]:
+    """What is known of a joint that nothing explains; nothing where that is said already."""
+    if told.verdict != "unexplained" or _severe(told):
+        return {}
+    return {"unexplained": unexplained(told.where, told.not_confirmed)}
 
 
 def _severe(told: Explanation) -> list[str]:

@@ -17,7 +17,7 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         if "error" not in row:
             errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
             cells = [percent(e[w]) if w in e else "" for e in errors for w in ("before", *after)]
-        below = "see below" * bool("error" in row or row["findings"])
+        below = "see below" * any(row.get(key) for key in ("error", "findings", "unexplained"))
         table.append([row["joint"], row["verdict"], *cells, below])
     lines = [f"{printable(simulator)} against {printable(log)}", ""]
     lines += aligned(table, range(2, 4 + 2 * len(after)))
@@ -30,6 +30,9 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         said = [row["error"]] if "error" in row else row["findings"]
         for each in said:
             lines += [] if each in shared else ["", *wrapped(f"{row['joint']}: {each}")]
+        if row.get("unexplained"):
+            more = f"More by --joint {row['joint']}."
+            lines += ["", *wrapped(f"{row['joint']}: {row['unexplained']} {more}")]
         if row.get("corrected_before"):
             lines += ["", f"{row['joint']}: judged with {', '.join(row['corrected_before'])}"]
         for each in row.get("actuator", ()):

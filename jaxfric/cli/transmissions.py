@@ -33,7 +33,8 @@ def with_springs(
     A spring competes with the whole answer without it: it is believed where it leaves no joint
     clearly more, and one of them clearly less, or takes fewer numbers. Where an answer stands that
     leaves no less than one with a spring, what it says of the simulator's values is not sure. Nor
-    is it where a spring in a second transmission would leave less: one stands for both then.
+    is it where a spring in a second transmission would leave clearly less: one stands for both
+    then.
 
     **Arguments:** `explained`: the joints by a file or a text.
     """
@@ -55,11 +56,12 @@ def with_springs(
         doubtful = found.share >= HALF and not _values(answer) <= _values(again)
         return _doubted(answer, found.rivalled()) if doubtful else answer
     if (other := _once_more(again, found, text, arguments)) is not None:
-        again = _with_spring(answer, other, text, explained, arguments)
-    if again.open:
+        found = other
+        again = _with_spring(answer, found, text, explained, arguments)
+    if again.open and not found.alone:
         doing("other transmissions")
         more = elastic_joint(_told(again), again.source, folder_of(arguments.mujoco))
-        if more is not None:
+        if more is not None and not found.stands_beside(more):
             return _doubted(answer, found.among(more))
     return again
 

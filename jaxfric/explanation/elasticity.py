@@ -56,6 +56,17 @@ class ElasticJoint(NamedTuple):
         """What it says where values of the simulator explain as much with as few numbers."""
         return self._doubted("explains as much as what is named here")
 
+    @property
+    def alone(self) -> bool:
+        """Whether another spring could not take beside it what any has to take."""
+        return 1 - self.share < LEAST_SHARE
+
+    def stands_beside(self, other: "ElasticJoint | Suspicion") -> bool:
+        """Whether a spring that was found beside this one takes less than any spring has to take,
+        of what no value explains without either.
+        """
+        return (1 - self.share) * other.share < LEAST_SHARE
+
     def among(self, other: "ElasticJoint | Suspicion") -> "Suspicion":
         """What it says where another transmission gives, too: one of two springs alone has another
         stiffness.
@@ -67,20 +78,22 @@ class ElasticJoint(NamedTuple):
             f"does, and beside it one in joint {other.joint} still more, so that neither stiffness "
             "is told"
         )
-        return Suspicion(several, why, self.felt | other.felt)
+        both = 1 - (1 - self.share) * (1 - other.share)
+        return Suspicion(several, why, both, self.felt | other.felt)
 
     def _doubted(self, why: str) -> "Suspicion":
         text = quantity(self.estimates[STIFFNESS], smaller=False)
-        return Suspicion(self.joint, f"a spring of {text} {why}", self.felt)
+        return Suspicion(self.joint, f"a spring of {text} {why}", self.share, self.felt)
 
 
 class Suspicion(NamedTuple):
-    """A joint whose transmission may give, though no spring of it is sure, with `why`; and the
-    joints whose force it would change.
+    """A joint whose transmission may give, though no spring of it is sure, with `why`; the `share`
+    of a spring there, as above, and the joints whose force it would change.
     """
 
     joint: str
     why: str
+    share: float
     felt: frozenset[str]
 
 
@@ -151,7 +164,7 @@ def _spring(
     felt = _felt(here, found.left[: len(here.rows.target)])
     if share < LEAST_SHARE or not felt:
         return None
-    doubt = Suspicion(trial.joint, DOUBT, felt) if share >= HALF else None
+    doubt = Suspicion(trial.joint, DOUBT, share, felt) if share >= HALF else None
     if other is None:
         return doubt
     there = trial.fitted(other, found.place, box)

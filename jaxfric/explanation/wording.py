@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..checks import LEFT
+from ..data.printable import listed_and
 from ..terms.effects import EFFECTS
 from .beyond import FAST_TONE
 from .fewest import SHAPE, SURE
@@ -72,6 +73,29 @@ def _not_confirmed(findings: Sequence[Finding]) -> str:
         f"What looks like {' and '.join(names)} here does not make the model better on the "
         "held-out recording, and is left out of the model."
     )
+
+
+def unexplained(where: Sequence[Mapping[str, Any]], not_confirmed: Sequence[Finding]) -> str:
+    """Of a joint that nothing explains, in a line: where most is left, and what was refuted."""
+    said = []
+    if where:
+        most = max(where, key=lambda each: each["share"])
+        over, detail = most["coordinate"].replace("_", " "), most["detail"]
+        more = f": {detail}" if detail else ""
+        said.append(f"most that the model leaves follows {over} ({most['share']:.0%}{more})")
+    for confirmed, why in _REFUSED.items():
+        own = [each for each in not_confirmed if each.confirmed is confirmed]
+        names = dict.fromkeys(each.effect.replace("_", " ") for each in own)
+        if names:
+            said.append(f"it looks like {listed_and(list(names))}, {why}")
+    return f"Not explained: {'; '.join(said) or 'no place stands out, and nothing fits'}."
+
+
+# Why what fits the rows is not in the model.
+_REFUSED = {
+    None: "with which the model is worse sample by sample",
+    False: "which the held-out recording does not confirm",
+}
 
 
 def _errors(fit: Mapping[str, Any], found: bool) -> str:

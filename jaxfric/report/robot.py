@@ -65,7 +65,8 @@ def _row(row: Mapping[str, Any], link: str | None) -> str:
         "" if each is None else f"{percent(each['before'])} → {percent(each['after'])}"
         for each in (row["filtered_force_error"], row["filtered_holdout_force_error"])
     ]
-    said = "<br>".join(escape(text) for text in row["findings"]) or "–"
+    texts = [*row["findings"], *filter(None, [row.get("unexplained")])]
+    said = "<br>".join(map(escape, texts)) or "–"
     cells = "".join(f'<td class="number">{each}</td>' for each in errors)
     return (
         f"<tr><td>{joint}</td><td>{verdict_name(row['verdict'])}</td>{cells}<td>{said}</td></tr>\n"

@@ -5,6 +5,7 @@ F = g (k w + b₀ + b₁ l + b₂ dl/dt), w the command u, or what follows it as
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -21,6 +22,9 @@ from .known import Attribute
 COMMAND = f"{KNOWN}command"
 # Time constants after which a filter's start is forgotten to a thousandth: ln 1000.
 FORGOTTEN = 7.0
+
+# Of its limit, where dry friction has all but reached it.
+AT_LIMIT = 0.999
 
 Parts = tuple[np.ndarray, np.ndarray]
 
@@ -188,24 +192,62 @@ def _made(own: Actuator, acting: np.ndarray, bias: np.ndarray) -> np.ndarray:
 def _timely(
     own: Actuator, recording: Recording, acting: np.ndarray, seen: Along, joint: int
 ) -> Actuator:
-    """The servo with the speed of the moment, where that accounts for most of what the speed that
-    the model's integrator takes leaves: a machine has no integrator, another simulator another.
+    """The servo with the speed of another moment, from that of now to that which the model's
+    integrator takes, where that accounts for most of what the latter leaves: a machine has no
+    integrator, another simulator another, or other steps.
+
+    Beside it the command may act a little late, and the fewest of the joint's values are wrong.
     """
     if not own.ahead or not own.bias[2]:
         return own
-    at_once = own._replace(ahead=0.0)
-    # The noise of the acceleration, which both leave, is beyond twice the width that tells it best.
-    weight = np.hanning(4 * signals.choose(recording, order=2).half_width + 3)
-    left = [_left(each, acting, seen, joint, weight) for each in (own, at_once)]
-    return at_once if left[1] < 0.5 * left[0] else own
+    rest, later, late, *values, needed = _in_slip(own, recording, acting, seen, joint)
+
+    def tried(some) -> tuple[float, float, float]:
+        """What is left, at which part of the way to now; and what is left at none."""
+        basis = np.linalg.qr(np.stack([late, *some], axis=1))[0]
+        left, column = (x - basis @ (basis.T @ x) for x in (rest, later))
+        part = float(left @ column) / max(float(column @ column), 1e-300)
+        part = min(max(part, 0.0), 1.0)
+        return float(np.sum((left - part * column) ** 2)), part, float(left @ left)
+
+    enough = 2 * tried(values)[0]
+    for count in range(len(values) + 1):
+        left, part, before = min(map(tried, itertools.combinations(values, count)))
+        if left <= enough:
+            break
+    return own._replace(ahead=own.ahead * (1 - part)) if left < 0.5 * before else own
 
 
-def _left(own: Actuator, acting: np.ndarray, seen: Along, joint: int, weight: np.ndarray) -> float:
-    """What the made force leaves of the needed one, but for a command that acts a little late."""
-    rest = _made(own, acting, _bias(own, joint, seen)) - seen.force[:, joint]
-    rest, slope = (np.convolve(x, weight, "valid") for x in (rest, np.gradient(acting)))
-    rest = rest - slope * float(slope @ rest) / max(float(slope @ slope), 1e-300)
-    return float(rest @ rest)
+def _in_slip(
+    own: Actuator, recording: Recording, acting: np.ndarray, seen: Along, joint: int
+) -> list[np.ndarray]:
+    """What the made force leaves of the needed one; what of it is the speed's moment, the
+    command's lateness, gain, damping, friction, a constant; and the needed force.
+
+    Like an inertia the moment shows by the acceleration, whose noise would hide it: it is moved
+    onto a kernel. Each kernel is wholly in slip, where friction is at its limit.
+    """
+    now = own._replace(ahead=0.0)
+    speed, held = seen.motion.velocity[:, joint], _bias(now, joint, seen)
+    braked = _bias(now._replace(bias=(0.0, 0.0, own.bias[2])), joint, seen)
+    gained = own.gear * own.gain * acting + held - braked
+    # Noise of the acceleration is beyond four times the width that tells that of a moment best.
+    half = 4 * signals.choose(recording, order=2).half_width + 1
+    span = half * float(np.median(np.diff(np.asarray(recording.time, float))))
+    at = np.arange(-half, half + 1) / half
+    weight, slope = (1 - at**2) ** 4, -8 / span * at * (1 - at**2) ** 3
+
+    def through(values, kernel=weight):
+        return np.convolve(values, kernel, "valid")
+
+    later = own.ahead * through(braked, slope)
+    needed = through(seen.rest[:, joint]) + through(seen.momentum[:, joint], slope)
+    rest = through(_made(own, acting, held)) + later - needed
+    way, dry = np.sign(speed), seen.friction[:, joint]
+    firm = np.where(way * dry >= AT_LIMIT * np.abs(dry).max(), way, 0.0)
+    slips = np.abs(through(firm)) > (1 - 1e-9) * weight.sum()
+    columns = map(through, (np.gradient(acting), gained, speed, way, np.ones_like(speed)))
+    return [each[slips] for each in (rest, later, *columns, needed)]
 
 
 def _held(command: np.ndarray, time: np.ndarray, delay: float) -> np.ndarray:

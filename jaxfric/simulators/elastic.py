@@ -15,6 +15,7 @@ import jax
 import numpy as np
 
 from .. import signals
+from ..checks import LINEARITY
 from ..data.recording import Recording
 from . import inverse
 from .inverse import Motion
@@ -31,9 +32,9 @@ TINY = 1e-6
 STEPS = 4
 # Of the load, what the equation is off where the steps end; beyond all that a sensor tells.
 CONVERGED = 1e-6
-# What a spring did before the recording is gone after so many of its time constants, but for a
-# twentieth; of a recording at most so much is given up for it.
-FORGOTTEN, MOST = 3.0, 0.25
+# What a spring did before the recording is gone after so many of its time constants, but for what
+# no sensor of force resolves; of a recording at most so much is given up for it.
+FORGOTTEN, MOST = float(np.log(1 / LINEARITY)), 0.25
 # Of a position, m or rad, and of a speed: steps of numerical derivatives.
 STEP = 1e-4
 
