@@ -23,6 +23,8 @@ COMMAND = f"{KNOWN}command"
 # Time constants after which a filter's start is forgotten to a thousandth: ln 1000.
 FORGOTTEN = 7.0
 
+# No effect has quite the shape of its law: of the amplitude so much may be something else.
+SHAPE = 0.1
 # Of its limit, where dry friction has all but reached it.
 AT_LIMIT = 0.999
 
@@ -200,19 +202,20 @@ def _timely(
     """
     if not own.ahead or not own.bias[2]:
         return own
-    rest, later, late, *values, needed = _in_slip(own, recording, acting, seen, joint)
+    rest, later, late, *values = _in_slip(own, recording, acting, seen, joint)
 
-    def tried(some) -> tuple[float, float, float]:
-        """What is left, at which part of the way to now; and what is left at none."""
+    def tried(some) -> tuple[float, float, float, float]:
+        """What is left, at which part of the way to now; at none; and what all of it makes."""
         basis = np.linalg.qr(np.stack([late, *some], axis=1))[0]
         left, column = (x - basis @ (basis.T @ x) for x in (rest, later))
         part = float(left @ column) / max(float(column @ column), 1e-300)
         part = min(max(part, 0.0), 1.0)
-        return float(np.sum((left - part * column) ** 2)), part, float(left @ left)
+        after = float(np.sum((left - part * column) ** 2))
+        return after, part, float(left @ left), float(column @ column)
 
-    enough = 2 * tried(values)[0]
+    enough = 2 * tried(values)[0] + SHAPE**2 * tried([])[3]
     for count in range(len(values) + 1):
-        left, part, before = min(map(tried, itertools.combinations(values, count)))
+        left, part, before, _ = min(map(tried, itertools.combinations(values, count)))
         if left <= enough:
             break
     return own._replace(ahead=own.ahead * (1 - part)) if left < 0.5 * before else own
@@ -222,7 +225,7 @@ def _in_slip(
     own: Actuator, recording: Recording, acting: np.ndarray, seen: Along, joint: int
 ) -> list[np.ndarray]:
     """What the made force leaves of the needed one; what of it is the speed's moment, the
-    command's lateness, gain, damping, friction, a constant; and the needed force.
+    command's lateness, gain, damping, friction, a constant.
 
     Like an inertia the moment shows by the acceleration, whose noise would hide it: it is moved
     onto a kernel. Each kernel is wholly in slip, where friction is at its limit.
@@ -247,7 +250,7 @@ def _in_slip(
     firm = np.where(way * dry >= AT_LIMIT * np.abs(dry).max(), way, 0.0)
     slips = np.abs(through(firm)) > (1 - 1e-9) * weight.sum()
     columns = map(through, (np.gradient(acting), gained, speed, way, np.ones_like(speed)))
-    return [each[slips] for each in (rest, later, *columns, needed)]
+    return [each[slips] for each in (rest, later, *columns)]
 
 
 def _held(command: np.ndarray, time: np.ndarray, delay: float) -> np.ndarray:
