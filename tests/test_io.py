@@ -767,10 +767,7 @@ def test_delta_servo_and_ur10e():
         ("time,position,force", {}, "force as N and position as m"),
         ("time,velocity,force [N]", {}, "position as m"),
         ("time,position [mm],force [N]", {}, None),
-        ("time,position,torque", {}, "named: position as rad (else --units position=UNIT)"),
-        ("time,position [rad],torque", {}, None),
-        ("t,q,tau", {}, "force as N·m and position as rad"),
-        ("t,q,f", {}, "force as N and position as m"),
+        ("time,position,torque", {}, None),
         ("time,position,current", {"units": {"position": "rad"}}, None),
     ],
 )
@@ -780,33 +777,6 @@ def test_a_unit_that_nothing_names_is_said(tmp_path, head, options, said):
     path.write_text(f"{head}\n{rows}\n")
     _, notes = io.read_with_notes(path, served=True, **options)
     assert said in notes[0] if said else "No unit is named" not in notes[0]
-
-
-@pytest.mark.parametrize(
-    "head, options, force, position",
-    [
-        ("t,q,tau", {}, "N·m", "rad"),
-        ("t,theta,tau_measured", {}, "N·m", "rad"),
-        ("t,q [deg],tau", {}, "N·m", "deg"),
-        ("t,omega,tau", {}, "N·m", "rad"),
-        ("t,q,tau", {"units": {"position": "rev"}}, "N·m", "rev"),
-        # straight, or in the user's own units
-        ("t,x,tau", {}, "N", "m"),
-        ("t,q [mm],tau", {}, "N", "mm"),
-        ("t,q,qd [m/s],tau", {}, "N", "m"),
-        ("t,q,tau", {"units": {"position": "m"}}, "N", "m"),
-        ("t,q,tau", {"scale": {"position": 0.01}}, "N", "m"),
-        ("t,q,tau", {"scale": {"force": 0.01}}, "N", "m"),
-        ("t,q,f", {}, "N", "m"),
-        ("t,q,current", {}, "A", "m"),
-    ],
-)
-def test_a_force_called_tau_is_a_torque(tmp_path, head, options, force, position):
-    path = tmp_path / "log.csv"
-    path.write_text(
-        f"{head}\n" + "".join(f"{0.01 * i}{',1' * head.count(',')}\n" for i in range(20))
-    )
-    assert io.read(path, **options).unit_names == {"force": force, "position": position}
 
 
 # ---- what is no log of one axis ----

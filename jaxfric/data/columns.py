@@ -8,7 +8,7 @@ import re
 import shlex
 from collections.abc import Iterable, Mapping
 
-from ..units import SI, TORQUES, factor
+from ..units import SI, TORQUES
 from . import makers
 from .languages import PARTICLES, english, plain
 from .nearest import meant
@@ -36,8 +36,6 @@ _SYNONYMS = {
     "neighbour_velocity": "neighbourvelocity neighborvelocity",
 }
 MOTION = frozenset({"position", "velocity"})
-# Of these names a motion is straight.
-_STRAIGHT = frozenset("x y z xd dx xdot displacement height stroke altitude".split())
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
 _MEASURED = frozenset(
     "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
@@ -136,13 +134,13 @@ def stated_unit(name: str, role: str) -> str | None:
 def served(
     chosen: Mapping[str, str],
     scale: Mapping[str, float],
-    given: Mapping[str, str],
+    named: Mapping[str, str],
     names: Iterable[str],
 ) -> str:
     """Which column serves as what, the factors, the units that nothing names, and what of the
     file's `names` is not used.
 
-    `given`: the units of force and position as the user gives them.
+    `named`: the units of force and position that are [given or stated][jaxfric.data.columns.units].
     """
     pieces = []
     for role, column in chosen.items():
@@ -150,9 +148,8 @@ def served(
         name = column if column.isprintable() else repr(column)
         pieces.append(f"{role}{f' from {name}' if column != role else ''}{factor}")
     roles = {"force": {"force"}, "position": {"position", "velocity"}}
-    named, full = _named(chosen, scale) | dict(given), SI | units(chosen, scale, given)
     taken = [r for r, those in roles.items() if r not in named and those & set(chosen)]
-    default = " and ".join(f"{role} as {full[role]}" for role in taken)
+    default = " and ".join(f"{role} as {SI[role]}" for role in taken)
     option = ",".join(f"{role}=UNIT" for role in taken)
     said = f"Columns: {', '.join(pieces)}."
     said += f" No unit is named: {default} (else --units {option})." * bool(taken)
@@ -292,26 +289,13 @@ def _commanded(names: Iterable[str]) -> str:
 def units(
     chosen: Mapping[str, str], scale: Mapping[str, float], given: Mapping[str, str]
 ) -> dict[str, str]:
-    """Names of the force and position unit: given, else by the columns' names, else none.
+    """Names of the force and position unit: given, else stated by the columns' names, else none.
 
-    The motion that goes with a torque is an angle, in rad: torque times rad/s is power. A force
-    called tau is a torque where the motion's name and unit say nothing of a straight line.
+    A scaled column no longer has the unit in its name. A column called torque is in N·m and one
+    called current in A unless said otherwise, and the motion that goes with a torque is an
+    angle: torque times rad/s is power.
     """
-    found = _named(chosen, scale) | dict(given)
-    if scale.get("position") is not None:
-        return found
-    if "force" not in found and _turns(chosen, scale, found):
-        found["force"] = "N·m"
-    if found.get("force") in TORQUES:
-        found.setdefault("position", "rad")
-    return found
-
-
-def _named(chosen: Mapping[str, str], scale: Mapping[str, float]) -> dict[str, str]:
-    """The units that the columns' names state; a scaled column no longer has that of its name.
-
-    A column called torque is in N·m and one called current in A unless said otherwise.
-    """
+    found = {}
     force, position = _stated("force", chosen, scale), _stated("position", chosen, scale)
     if position is None and (velocity := _stated("velocity", chosen, scale)):
         position = velocity.removesuffix("/s") if velocity.endswith("/s") else None
@@ -319,17 +303,13 @@ def _named(chosen: Mapping[str, str], scale: Mapping[str, float]) -> dict[str, s
     words = _words(chosen["force"]) if named else []
     if force is None:
         force = "N·m" if "torque" in words else "A" if "current" in words else None
-    return {role: unit for role, unit in (("force", force), ("position", position)) if unit}
-
-
-def _turns(chosen: Mapping[str, str], scale: Mapping[str, float], named: Mapping[str, str]) -> bool:
-    """Whether the force is called tau and nothing says that the motion is straight."""
-    if "force" not in chosen or scale.get("force") is not None:
-        return False
-    if "tau" not in (word.rstrip("0123456789") for word in _words(chosen["force"])):
-        return False
-    words = {word for role in MOTION & set(chosen) for word in _words(chosen[role])}
-    return not words & _STRAIGHT and factor(named.get("position", ""), "m") is None
+    if force:
+        found["force"] = force
+    if position is None and (given.get("force") or force) in TORQUES:
+        position = None if scale.get("position") is not None else "rad"
+    if position:
+        found["position"] = position
+    return found | dict(given)
 
 
 def _stated(role: str, chosen: Mapping[str, str], scale: Mapping[str, float]) -> str | None:

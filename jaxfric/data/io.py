@@ -138,7 +138,7 @@ def read_with_notes(
     named = names.units(chosen, scale, units)
     time, counted, in_seconds = _time(table, chosen, scale, path)
     scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
-    notes = [names.served(chosen, scale, units, own)] if served else []
+    notes = [names.served(chosen, scale, named, own)] if served else []
     notes += table.notes + names.unknown_units(chosen, scale) + counted
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)

@@ -127,7 +127,7 @@ class Feed:
         implied, named = per_second(chosen, scale, units or {}, source)
         self.units = names.units(chosen, scale, named)
         scale = implied | scale
-        self.served = names.served(chosen, scale, named, header)
+        self.served = names.served(chosen, scale, self.units, header)
         self._source, self._width = source, len(header)
         self._index = {
             role: (header.index(chosen[role]), scale.get(role, 1.0))
