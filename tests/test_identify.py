@@ -437,6 +437,12 @@ def test_a_size_whose_width_may_be_anything_is_told(width, told):
     assert told or off < found.parameters["stribeck_force-"].half_width()
 
 
+def test_each_row_of_a_batch_is_told_of_its_own_widths():
+    fits = jf.identify("gaussian", jf.stack([_passing(0.05), _passing(0.02), _passing(0.04)]))
+    told = ["shape_unknown" in {remark.name for remark in fits[i].remarks} for i in range(3)]
+    assert told == [False, True, False]
+
+
 @pytest.mark.slow
 def test_a_direction_that_never_moved_is_named():
     run = recording(machine(), noise=0.05)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..identification.grids import resolution
+from ..identification.grids import features, resolution, to_unit
 from ..terms.base import AbstractTerm
 from ..terms.sample import Scales
 
@@ -46,15 +46,13 @@ class Space:
         """Coordinates at which one parameter is looked for, `(G,)`: of a period as near to each
         other as two minima are.
         """
-        how = resolution(self.parameters[number])
+        parameter = self.parameters[number]
+        how = resolution(parameter)
         if how.over is None:
             return (np.arange(GRID) + 0.5) / GRID
-        ends = self.beta(np.outer([0.0, 1.0], np.ones(len(self.low))))[:, number] ** how.power
-        features = float(how.over(self.limits)) * abs(ends[1] - ends[0])
-        count = int(np.clip(how.per * features, GRID, MOST))
-        beta = np.repeat(self.beta(np.full(len(self.low), 0.5))[None], count, axis=0)
-        beta[:, number] = np.linspace(float(ends[0]), float(ends[1]), count) ** (1 / how.power)
-        return self.point(beta)[:, number]
+        low, high = self.beta(np.outer([0.0, 1.0], np.ones(len(self.low))))[:, number]
+        count = int(np.clip(how.per * features(how, self.limits, low, high), GRID, MOST))
+        return np.asarray(to_unit(np.linspace(0.0, 1.0, count), parameter, low, high))
 
     def rate(self, point: np.ndarray) -> np.ndarray:
         """Derivatives of the parameters by their coordinates."""

@@ -61,7 +61,6 @@ def checked(
         np.array(x, float, ndmin=n)
         for x, n in ((found.model.alpha, 2), (found.covariance, 3), (found.filtered_force_error, 1))
     )
-    betas = np.array(found.model.term.beta(), float).reshape(len(alphas), -1)
     spreads = np.diagonal(matrices, axis1=1, axis2=2)[:, : len(names)]
     halves = uncertainty.student_quantile(0.975, uncertainty.COSINES) * np.sqrt(spreads)
     delayed = found.model.force_delay is not None
@@ -79,7 +78,6 @@ def checked(
         if suspect[i]:
             fitted = checks.fitted(row_of(designs, i), float(error), fit)
             warnings[i] = np.where(np.isnan(fitted), warnings[i], fitted)
-        # A force that is late by cycles bends the curve, too.
         late_force = not np.isnan(fitted[LATE])
         if unsure := abs(fitted[LATE]) if late_force else _unsure(late, interval, delayed):
             shift = designs.shift[i] * unsure
@@ -90,12 +88,11 @@ def checked(
             own, log = row_of(designs, i), row_of(logs, i)
             if checks.hides(own, log.time, log.position, log.mask, alpha, sure):
                 warnings[i, STRUCTURE] = error
+        # A force that is late by cycles bends the curve, too.
         if not late_force and (missed := checks.misfit(row_of(designs, i))):
             warnings[i, checks.NAMES.index(missed.name) :][:2] = missed.most, missed.at
         if negative := _negative(names, alpha, half, passive):
             warnings[i, NEGATIVE] = negative
-        if open_shapes := _open_shapes(found.model.term, alpha, betas[i], matrices[i]):
-            warnings[i, SHAPE] = open_shapes
         if not np.isnan(warnings[i, ONE_SPEED]) and "inertia" in names:
             # What accelerates the axis there is noise.
             k = names.index("inertia")
@@ -104,6 +101,8 @@ def checked(
         if not np.isnan(gain := warnings[i, GAIN]):
             shift = (gain - 1) * _by_velocity(found, i)
             matrices[i] += np.outer(shift, shift)
+    count = _open_shapes(found.model.term, alphas, matrices)
+    warnings[:, SHAPE] = np.where(count > 0, count, np.nan)
     severe = np.array([kind.severe for kind in checks.KINDS])
     wrong = np.any(~np.isnan(warnings) & severe, axis=1).reshape(faults.shape[:-1])
     warnings = warnings.reshape(faults.shape).astype(np.asarray(found.filtered_force_error).dtype)
@@ -132,19 +131,22 @@ def _negative(names: tuple[str, ...], alpha: np.ndarray, half: np.ndarray, passi
     return int(np.sum((alpha + half)[counted] < 0))
 
 
-def _open_shapes(
-    term: AbstractTerm, alpha: np.ndarray, beta: np.ndarray, matrix: np.ndarray
-) -> int:
-    """How many ratio-scaled shapes are known no better than down to zero, of sizes that seem sure.
+def _open_shapes(term: AbstractTerm, alphas: np.ndarray, matrices: np.ndarray) -> np.ndarray:
+    """How many ratio-scaled shapes of each row are known no better than down to zero, of sizes that
+    seem sure, `(B,)`.
 
-    Of parameters `alpha`, `(p,)`, and `beta`, `(d,)`, with their covariance, `(P, P)`. An interval
+    Of affine parameters `alphas`, `(B, p)`, and the covariances of all, `(B, P, P)`. An interval
     is a straight line's: so far from the value the size is another one.
     """
+    beta = np.array(term.beta(), float).reshape(len(alphas), -1)
     width = uncertainty.student_quantile(0.975, uncertainty.COSINES)
-    half, reach = np.split(width * np.sqrt(np.diagonal(matrix)), [len(alpha)])
-    sized = (any(abs(alpha[j]) > half[j] for j in some) for some in changed_columns(term))
-    shapes = zip(term.nonlinear, beta, reach, sized, strict=True)
-    return sum(p.logarithmic and size and bool(far >= value) for p, value, far, size in shapes)
+    reach = width * np.sqrt(np.diagonal(matrices, axis1=1, axis2=2))
+    half, reach = np.split(reach, [alphas.shape[1]], axis=1)
+    sure, count = np.abs(alphas) > half, np.zeros(len(alphas), int)
+    for i, (parameter, sizes) in enumerate(zip(term.nonlinear, changed_columns(term), strict=True)):
+        if parameter.logarithmic:
+            count += (reach[:, i] >= beta[:, i]) & sure[:, sizes].any(axis=1)
+    return count
 
 
 def _unsure(late: checks.Lateness | None, interval: float, delayed: bool) -> float:

@@ -123,8 +123,15 @@ def _steps(number, term, scales, box) -> float:
             return float(np.max(how.per * (high - low) / box[0, other]))
         if how.over is None:
             return how.per
-        features = np.asarray(how.over(scales)) * (high**how.power - low**how.power)
-        return float(np.max(how.per * np.abs(features)))
+        return float(np.max(how.per * features(how, scales, low, high)))
+
+
+def features(how: Resolution, scales: Scales, low, high) -> np.ndarray:
+    """How many features, as a wave's cycles over the stroke, a parameter passes between two ends.
+
+    Of a resolution with `over`; `scales` and the ends of any one shape, that of the result.
+    """
+    return np.abs(np.asarray(how.over(scales)) * (high**how.power - low**how.power))
 
 
 def _share(parameter, box, coarse) -> float:
