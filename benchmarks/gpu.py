@@ -18,9 +18,9 @@ import peers
 
 from jaxfric import identify
 from jaxfric.data.recording import stack
-from jaxfric.identification.identifying import solve_rows
 from jaxfric.identification.projections import ClosedWindows
 from jaxfric.identification.setup import set_up
+from jaxfric.identification.solving import solve_rows
 
 GRIDS = ((20_000, 1000), (200_000, 4000))
 AXES = (256, 4096)

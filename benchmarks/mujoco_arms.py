@@ -116,7 +116,7 @@ def run(rng, mjcf: str, links, extra, seconds: float = 20.0):
     omega = 20 * rates[-1]
     kp, kd = plant.dof_M0 * omega**2, 2 * plant.dof_M0 * omega
     count = round(seconds / plant.opt.timestep)
-    time, position, force = np.arange(count) * plant.opt.timestep, [], []
+    time, position, applied = np.arange(count) * plant.opt.timestep, [], []
     for now in time:
         angle = rates * now + phases
         goal, speed = np.sin(angle) @ sizes, np.cos(angle) @ (sizes * rates)
@@ -126,9 +126,9 @@ def run(rng, mjcf: str, links, extra, seconds: float = 20.0):
             i = extra["joint"]
             data.qfrc_applied[i] -= beyond(extra, data.qpos[i], data.qvel[i])
         position.append(data.qpos.copy())
-        force.append(wanted)
+        applied.append(wanted)
         mujoco.mj_step(plant, data)
-    force = np.array(force)
+    force = np.array(applied)
     noise = rng.uniform(0.002, 0.01) * np.sqrt(np.mean(force**2, axis=0))
     force = force + noise * rng.normal(size=force.shape)
     every, start = int(rng.integers(2, 5)), round(SETTLED / plant.opt.timestep)

@@ -14,9 +14,9 @@ import scipy.optimize
 from jaxfric.data.recording import Recording
 from jaxfric.identification import reduced
 from jaxfric.identification.assessment import solve
-from jaxfric.identification.identifying import _without_inertia
 from jaxfric.identification.projections import ClosedWindows
 from jaxfric.identification.search import search
+from jaxfric.identification.solving import without_inertia
 from jaxfric.models import named
 from jaxfric.signals import prepare, scales
 from jaxfric.terms.base import bounds
@@ -43,7 +43,7 @@ def problem(samples, name="gaussian"):
     ready = prepare(axis(samples))
     size = scales(ready)
     rows = rows_of(ready, size)
-    term = _without_inertia(named(name))
+    term = without_inertia(named(name))
     return term, ready, rows, bounds(term, size)
 
 
@@ -54,7 +54,7 @@ def again(samples, seed):
     return (
         ready,
         rows_of(ready, size),
-        bounds(_without_inertia(named("gaussian")), size),
+        bounds(without_inertia(named("gaussian")), size),
     )
 
 

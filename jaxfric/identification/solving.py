@@ -221,11 +221,16 @@ def _reached(rows: Rows, recording: Recording, limits: Scales) -> Float[Array, "
 
 def _active(term: AbstractTerm, projection, limits: Scales) -> AbstractTerm:
     """The terms that are fitted, with moments that have a derivative."""
-    own = term if projection.keeps_inertia else _without_inertia(term)
+    own = term if projection.keeps_inertia else without_inertia(term)
     return own.resolved(moments.RAMP * limits.interval)
 
 
-def _without_inertia(term: AbstractTerm) -> AbstractTerm:
+def without_inertia(term: AbstractTerm) -> AbstractTerm:
+    """The terms that closed windows leave: all but inertia.
+
+    Raises:
+        ValueError: There is no other.
+    """
     kept = tuple(t for t in summands(term) if not isinstance(t, Inertia))
     if not kept:
         raise ValueError("The model has no term but inertia; add friction, e.g. terms.Coulomb().")
