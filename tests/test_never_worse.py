@@ -675,6 +675,11 @@ def test_what_the_rows_show_and_no_sample_is_told_as_not_in_the_model():
     assert said.startswith(wording.REFUTED)
     document["not_confirmed"].append(refuted._asdict())
     assert "in both recordings" in advice.headline(document)
+    recurs = refuted._replace(recurs=True)
+    said = wording.summary("unexplained", "gaussian", [], [recurs], fit, [])
+    assert said.startswith(wording.RECURS) and "shows backlash too" in said
+    document["not_confirmed"] = [recurs._asdict()]
+    assert "do not hold in the other recording" in advice.headline(document)
 
 
 def test_a_law_that_is_looked_for_in_another_way_is_not_told_as_beside_the_rows(monkeypatch):

@@ -80,7 +80,9 @@ class Finding(NamedTuple):
     - `attribute`: the simulator's own name for it, where there is one; `confirmed`: whether the
       held-out recording confirms it, `None` where it is not tested; `instead`: to each wrong value
       by name, others that this motion cannot tell from it; `untold`: a simulator's values that are
-      fitted with the others, but may be as they were, or are such as nothing can have.
+      fitted with the others, but may be as they were, or are such as nothing can have; `recurs`:
+      of what is not confirmed, whether the held-out recording shows it too, though the model with
+      its values from here is worse there.
     """
 
     effect: str
@@ -96,6 +98,7 @@ class Finding(NamedTuple):
     confirmed: bool | None = None
     instead: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     untold: tuple[str, ...] = ()
+    recurs: bool = False
 
 
 def findings_document(findings: Sequence[Finding]) -> list[dict[str, Any]]:

@@ -107,7 +107,9 @@ def not_confirmed(better: Improved) -> list[Finding]:
     every, _ = reported(better.claimed, better.first)
     return shown + [
         every[n]._replace(
-            confirmed=False, sentence=f"{every[n].sentence}{_reason(every[n], better)}"
+            confirmed=False,
+            recurs=_recurs(every[n], better),
+            sentence=f"{every[n].sentence}{_reason(every[n], better)}",
         )
         for n in better.refuted
     ]
@@ -124,11 +126,16 @@ def _beside_rows(better: Improved) -> list[Finding]:
     ]
 
 
+def _recurs(finding: Finding, better: Improved) -> bool:
+    """Whether the held-out recording shows it too, though the model with it is worse."""
+    return bool(better.worse is not None and finding.confirmed)
+
+
 def _reason(finding: Finding, better: Improved) -> str:
     """Why a finding is not confirmed, the end of its sentence."""
     if finding.confirmed is None:  # as the sentence has said
         return " The model is no better there with it, so it is left out."
-    if better.worse is None or not finding.confirmed:
+    if not _recurs(finding, better):
         return " The held-out recording does not bear it out: it is not in the model."
     name, change = _risen(*better.worse)
     error = "filtered force error" if name.startswith("filtered") else "force error"

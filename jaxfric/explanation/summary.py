@@ -83,7 +83,7 @@ def summarise(
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(better.findings, filtered)
-    missing |= _values_differ(errors, effects, apart)
+    missing |= _values_differ(errors, effects, apart) or any(f.recurs for f in refuted)
     much = missing and not known.rough
     standing = stand_ins(alone, 1 - selection.last.energy / better.first.energy)
     # In another recording that is compared with, what has no name may be as well.

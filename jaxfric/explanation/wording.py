@@ -32,6 +32,8 @@ CHANGES = {
 
 # Of `unexplained`, where the held-out recording does not bear out what would account for it here.
 REFUTED = "Something is missing, and no effect accounts for it in both recordings."
+# Of `unexplained`, where both recordings show it, but not with values that are known well enough.
+RECURS = "Something is missing, and its values from here do not hold in the other recording."
 # Of `unexplained`, where a model with what would account for it is worse sample by sample.
 SHAPED = "Something is missing, and the model is not better with what accounts for it."
 # Instead of a verdict's words, where what was measured contradicts itself.
@@ -53,11 +55,15 @@ def summary(
     shaped = any(finding.confirmed is None for finding in not_confirmed)
     not_confirmed = [finding for finding in not_confirmed if finding.confirmed is False]
     if verdict == "unexplained" and not_confirmed:
-        words = words | {verdict: REFUTED}
+        words = words | {verdict: RECURS if all(f.recurs for f in not_confirmed) else REFUTED}
     elif shaped:
         words = words | {"unexplained": SHAPED}
     said = DOUBTED if severe and not findings else words[verdict]
-    refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
+    refuted = [
+        _not_confirmed(some, recurs)
+        for recurs in (True, False)
+        if (some := [f for f in not_confirmed if f.recurs == recurs])
+    ]
     hums = any(each["name"] == FAST_TONE for each in warnings)
     errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
@@ -67,8 +73,13 @@ def summary(
     return " ".join([*whole, *(elsewhere or _of_a_moment(findings, fit) or more)])
 
 
-def _not_confirmed(findings: Sequence[Finding]) -> str:
+def _not_confirmed(findings: Sequence[Finding], recurs: bool) -> str:
     names = dict.fromkeys(finding.effect.replace("_", " ") for finding in findings)
+    if recurs:
+        return (
+            f"The held-out recording shows {' and '.join(names)} too, but the model with the "
+            "values from here is worse, and does without."
+        )
     return (
         f"What looks like {' and '.join(names)} here does not make the model better on the "
         "held-out recording, and is left out of the model."

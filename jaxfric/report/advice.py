@@ -52,7 +52,10 @@ def headline(document: Mapping[str, Any]) -> str:
 
 def _unaccounted(document: Mapping[str, Any]) -> str:
     """Why nothing accounts for what is missing."""
-    left_out = {each["confirmed"] for each in document.get("not_confirmed") or ()}
+    others = document.get("not_confirmed") or ()
+    left_out = {each["confirmed"] for each in others}
+    if others and all(each.get("recurs") for each in others):
+        return ", and its values from here do not hold in the other recording"
     if False in left_out:
         return ", and no effect accounts for it in both recordings"
     if None in left_out:

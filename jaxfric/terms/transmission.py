@@ -38,8 +38,9 @@ class _Flank(NamedTuple):
     """A load on a spring and a damper: dw/dt = p − d sign(w) − κ w, p = ω² o + 2ζω do/dt.
 
     `omega` ω, 1/s; `damping` ζ; `forward` and `backward`, d where w > 0 and where w < 0, m/s²;
-    `decay` κ, 1/s. All within a step is along the way in which the spring is wound up by o, m.
-    With ζ < 1 the load swings in touch, however large its viscous friction.
+    `decay` κ, 1/s; `swings`: ζ is known to be below one, and the load swings in touch, however
+    large its viscous friction. All within a step is along the way in which the spring is wound up
+    by o, m.
     """
 
     omega: Float[Array, ""]
@@ -47,6 +48,7 @@ class _Flank(NamedTuple):
     forward: Float[Array, ""]
     backward: Float[Array, ""]
     decay: Float[Array, ""] | float
+    swings: bool
 
     def dry(self, side):
         """d, m/s², without a sign, of a load that goes or is pushed to a side."""
@@ -55,11 +57,6 @@ class _Flank(NamedTuple):
     def push(self, over, slip):
         """p, m/s², where the motor is faster by `slip`, m/s."""
         return self.omega * (self.omega * over + 2 * self.damping * slip)
-
-    @property
-    def swings(self) -> bool:
-        """Whether the damping is a number that is known to leave a swing."""
-        return isinstance(self.damping, float) and self.damping < 1
 
     @property
     def viscous(self):
@@ -190,6 +187,7 @@ def load_motion(
     half_gap: Float[Array, ""] | float | None = None,
     decay: Float[Array, ""] | float = 0.0,
     asymmetry: Float[Array, ""] | float = 0.0,
+    swings: bool = False,
 ) -> tuple[Float[Array, " N"], Float[Array, " N"]]:
     """What a load's friction takes of its push, per mass, f, m/s², and its speed w, m/s, `(N,)`.
 
@@ -197,10 +195,10 @@ def load_motion(
     strikes the load is in w, and is smoothed as the motor's own speed is. Without `half_gap`
     p = ω² s + 2ζω ds/dt, s, m, the way by which the motor, at the recording's position, is ahead;
     with it, δ, the spring has a dead zone from −δ to δ, and flanks do not pull. `omega` ω, 1/s;
-    `damping` ζ; `deceleration` d, m/s², of which there is 1 + `asymmetry` forwards and 1 − that
-    backwards; `decay` κ, 1/s. The motor's speed is straight between the samples; touch and flight
-    are solved exactly, to where the one ends and the other begins, once between two samples, for
-    any stiffness. A segment starts in slip.
+    `damping` ζ, `swings` if it is known to be below one; `deceleration` d, m/s², of which there is
+    1 + `asymmetry` forwards and 1 − that backwards; `decay` κ, 1/s. The motor's speed is straight
+    between the samples; touch and flight are solved exactly, to where the one ends and the other
+    begins, once between two samples, for any stiffness. A segment starts in slip.
     """
     begins, speed = starts(recording), recording.velocity
     span = jnp.where(begins, 0.0, jnp.pad(jnp.diff(recording.time), (1, 0)))
@@ -211,7 +209,7 @@ def load_motion(
     # So that the motor goes the way that its position says.
     first = jnp.where(span > 0, way / real - 0.5 * gain * span, speed)
     sides = deceleration * (1 + asymmetry), deceleration * (1 - asymmetry)
-    flank = _Flank(omega, damping, *sides, decay)
+    flank = _Flank(omega, damping, *sides, decay, swings)
     gap = 0.0 if half_gap is None else half_gap
     dtype = jnp.result_type(omega, *sides, gap)
     span, first, gain, speed = (each.astype(dtype) for each in (span, first, gain, speed))
@@ -251,6 +249,7 @@ class DryLoad(NamedTuple):
     half_gap: Float[Array, ""] | float | None = None
     decay: Float[Array, ""] | float = 0.0
     asymmetry: Float[Array, ""] | float = 0.0
+    swings: bool = False
 
     def friction(self, side):
         """The dry friction of a load that goes or is pushed to a side, per mass, signed, m/s²."""

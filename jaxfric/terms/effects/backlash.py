@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ...data.recording import Recording
-from ...units import FORCE, POSITION, VELOCITY
+from ...units import DIMENSIONLESS, FORCE, POSITION, VELOCITY
 from ..base import AbstractTerm
 from ..effect import Derived, Effect, Extent, View, even, inside, product, scattered, with_parameter
 from ..presliding import AbstractStates, States, starts
@@ -108,8 +108,20 @@ def _windup_bounds(scales):
     return 0.1 * low, high
 
 
-# Flanks in touch: a load that strikes them comes back with half its speed, as in steel gears.
-_FLANKS = 0.2
+def _flank_bounds(scales):
+    """From bare steel, off which a load comes back with three quarters of its speed, to flanks that
+    it stays at: e^(−πζ/√(1 − ζ²)) of it comes back.
+    """
+    return 0.1, 0.95
+
+
+_STEEL = 0.2
+# No more than a few blows tell it: begun in the middle, and refined with the rest.
+_HALF = 0.5
+FLANK_DAMPING = Parameter(
+    "flank_damping", DIMENSIONLESS, _flank_bounds, logarithmic=False,
+    resolution=Resolution(1, 1, None, 2),
+)  # fmt: skip
 
 
 class ElasticBacklash(AbstractDryLoad):
@@ -118,7 +130,8 @@ class ElasticBacklash(AbstractDryLoad):
     F_L T is what the flanks push the load of friction F_L and inertia F_L/d by. Of that the
     load's friction is the column, and its speed, beside the motor's, the momentum (`load_motion`).
     `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
-    is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest.
+    is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest. Off a flank it
+    comes back with half its speed, as from bare steel.
     """
 
     half_gap: Float[Array, ""] | float = UNKNOWN
@@ -146,7 +159,13 @@ class ElasticBacklash(AbstractDryLoad):
 
     @property
     def load(self) -> DryLoad:
-        return DryLoad(self.pace, _FLANKS, self.load_deceleration, self.half_gap, self.decay)
+        known = self.pace, self.damping, self.load_deceleration, self.half_gap, self.decay
+        return DryLoad(*known, swings=True)
+
+    @property
+    def damping(self):
+        """The damping ratio of the load on its flank, below one."""
+        return _STEEL
 
     @property
     def decay(self):
@@ -187,24 +206,31 @@ class DampedBacklash(ElasticBacklash):
     `viscous_speed` v_s, m/s: there it is as large as the dry friction F_L. So a load that flies
     through the gap is slowed by (1 ± α + w/v_s) d. `load_asymmetry` α: which part of the mean of
     its dry friction is more forwards and less backwards, as it also seems to be where the load has
-    a weight. When it leaves a flank, and strikes the other one, depends on it.
+    a weight. When it leaves a flank, and strikes the other one, depends on it. `flank_damping`: the
+    damping ratio of the load on its flank, below one: steel is hard, a film of oil is not.
     """
 
     viscous_speed: Float[Array, ""] | float = UNKNOWN
     load_asymmetry: Float[Array, ""] | float = 0.0
+    flank_damping: Float[Array, ""] | float = _STEEL
     nonlinear: ClassVar = (
         *ElasticBacklash.nonlinear,
         Parameter("viscous_speed", VELOCITY, _speed_bounds, resolution=Resolution(0, 0.5, None, 4)),
         ASYMMETRY,
+        FLANK_DAMPING,
     )
 
     def burden(self, beta, alpha) -> Burden:
         burden = super().burden(beta[:3], alpha)
-        return burden._replace(lighter=lambda factor: beta * np.array([1, 1, factor, 1, 1]))
+        return burden._replace(lighter=lambda factor: beta * np.array([1, 1, factor, 1, 1, 1]))
 
     @property
     def load(self) -> DryLoad:
         return super().load._replace(asymmetry=self.load_asymmetry)
+
+    @property
+    def damping(self):
+        return self.flank_damping
 
     @property
     def relief(self):
@@ -222,14 +248,19 @@ def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     """Gaps and windups from what is crossed in a twentieth of the kernel's reach to the widest."""
     if not isinstance(term, ElasticBacklash):
         return even(term, view)
-    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5))))
+    low, high = _ends(term, view)
     least = 0.25 * view.acceleration * (view.reach / 20) ** 2
     least = np.clip(least, low[0], 0.1 * high[0])
     # A stiff flank is soon passed, whatever its stiffness; a load's viscous friction at full speed
     # is mostly as large as its dry one, or of no account.
     widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
     speeds = view.limits.fastest * np.array([1.0, 5.0])
-    return product([widths, windups, coasting(view), speeds, uneven(view)])
+    return product([widths, windups, coasting(view), speeds, uneven(view), np.array([_HALF])])
+
+
+def _ends(term: AbstractTerm, view: View) -> np.ndarray:
+    """The least and the largest β, `(2, d)`."""
+    return inside(term, view.limits, np.outer([0.0, 1.0], np.ones(len(term.nonlinear))))
 
 
 def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
@@ -242,8 +273,7 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     """
     if not isinstance(term, ElasticBacklash):
         return np.zeros((0, len(term.nonlinear)))
-    place = scattered(count, 4)
-    low, high = (x[:2] for x in inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5))))
+    place, (low, high) = scattered(count, 5), _ends(term, view)
     least = np.clip(0.25 * view.acceleration * (view.reach / 20) ** 2, low[0], 0.1 * high[0])
     stroke = view.limits.high - view.limits.low
     widest = np.maximum(stroke / 30, 2 * least)
@@ -253,9 +283,9 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     ratio = 0.05 * 30.0 ** place[:, 3]  # viscous friction by dry friction there
     speed = 0.5 * view.limits.fastest / ratio
     none = np.zeros(len(place))  # about the best of them it is looked for
-    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, none], axis=1)
-    ends = inside(term, view.limits, np.outer([0.0, 1.0], np.ones(5)))
-    return np.clip(found, *ends)
+    damping = low[5] + (high[5] - low[5]) * place[:, 4]
+    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, none, damping], axis=1)
+    return np.clip(found, low, high)
 
 
 def _whole(values: Mapping[str, float], extent: Extent) -> dict[str, Derived]:
