@@ -65,6 +65,7 @@ CASES = {
     "filter": (T.SensorFilter(), (0.002,)),
     "dahl": (T.Dahl(0.002), (18.0,)),
     "lugre": (T.LuGre(0.002, 0.02), (18.0, 5.0)),
+    "maxwell_slip": (T.MaxwellSlip(0.002, 0.6), (18.0,)),
     "frictional_lag": (T.FrictionalLag(0.05, T.Gaussian(0.05)), (4.0,)),
     "frictional_lag_2": (T.FrictionalLag(0.05, T.Exponential(0.05), 2), (4.0,)),
     "backlash": (T.Backlash(0.003), (3.0,)),
@@ -542,6 +543,35 @@ def test_slow_backlash_unwinds_crosses_and_winds_up_again():
     wanted = np.interp(since, [0, 0.0005, 0.0045, 0.005], [-1, 0, 0, 1]) - 1
     found = np.asarray(term.columns(run)[:, 0])[time > 10.01]
     np.testing.assert_allclose(found, wanted, atol=0.06)
+
+
+def test_elements_slip_one_by_one():
+    """Turned back from slip, each gives way over twice its distance, and remembers no less."""
+    place = np.concatenate([np.linspace(0, 5, 51), np.linspace(5, 1, 41)[1:]]) * 1e-3
+    time = np.arange(place.size) * 1e-2
+    run = Recording(time, 0 * time, place, np.gradient(place, time))
+    column = np.asarray(T.MaxwellSlip(1.2e-3, 0.75).columns(run))[:, 0]
+    bent = np.stack([np.clip(1 - (5e-3 - place) / d, -1, 1) for d in (1.2e-3, 9e-4, 6e-4, 3e-4)])
+    back = slice(52, -1)
+    np.testing.assert_allclose(column[back], bent.mean(axis=0)[back] + 1, atol=1e-9)
+    # All with the same distance, they are one.
+    one = np.asarray(T.MaxwellSlip(1.2e-3, 0.0).columns(run))[back, 0]
+    np.testing.assert_allclose(one, bent[0][back] + 1, atol=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.2, 0.6, 0.95])
+def test_a_load_comes_back_off_a_flank_as_its_damping_says(damping):
+    """Flanks do not pull: e^(−ζθ/√(1 − ζ²)) of the speed, θ = atan2(2ζ√(1 − ζ²), 2ζ² − 1)."""
+    time = np.arange(8000) * 1e-5
+    speed = np.where(time < 0.01, -0.1, 0.1)  # it turns round, through its gap of 0.4 mm
+    place = np.concatenate([[0.0], np.cumsum(speed[1:]) * 1e-5])
+    run = Recording(time, 0 * time, place, speed)
+    slow = 0.5
+    term = T.DampedBacklash(2e-4, 1e-6, slow, 1e3, 0.0, damping)
+    ahead = np.asarray(term.columns_and_momentum(run)[1])[:, 0] * slow  # of the load, m/s
+    root = np.sqrt(1 - damping**2)
+    turn = np.arctan2(2 * damping * root, 2 * damping**2 - 1)
+    assert np.max(ahead[1001:]) == pytest.approx(0.2 * np.exp(-damping * turn / root), rel=0.02)
 
 
 def test_a_load_with_viscous_friction_is_slowed_by_it_in_its_gap():

@@ -165,6 +165,28 @@ def test_presliding_of_a_few_counts_is_named_with_its_distance():
     assert abs(float(parameters["presliding_force"].value) - LEVEL) < 0.15 * LEVEL
 
 
+def slipping(distances=(4e-6, 7e-6, 8e-6, 11e-6), **options):
+    """Elements side by side along strokes that turn back softly, each with its own distance."""
+    x, _, _ = path(6 * DISTANCE)
+    bent = np.ones((COUNT, len(distances)))
+    for i, step in enumerate(np.diff(x), 1):
+        bent[i] = np.clip(bent[i - 1] + step / np.array(distances), -1, 1)
+    return recorded(x, LEVEL * bent.mean(axis=1), **options)
+
+
+@pytest.mark.slow
+def test_presliding_of_elements_that_slip_one_by_one_is_no_load_on_a_spring():
+    """Dahl's bristle has an exponential end: it was one, and a compliance of any frequency."""
+    found = explain(slipping(), "symmetric-coulomb-viscous", slipping(seed=1))
+    assert [each.effect for each in found.findings] == ["presliding"]
+    parameters = found.findings[0].parameters
+    assert float(parameters["presliding_force"].value) == pytest.approx(LEVEL, rel=0.05)
+    names = "presliding_distance", "presliding_spread"
+    last, spread = (float(parameters[name].value) for name in names)
+    assert last * (1 - spread / 2) == pytest.approx(7.5e-6, rel=0.1)  # of all four the mean
+    assert found.verdict == "explained"
+
+
 def hilly(seed=0):
     """Presliding beside a force of position."""
     recording = yielding(seed=seed)

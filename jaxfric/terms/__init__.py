@@ -52,7 +52,7 @@ from .effects.position_dependent_friction import (
     PositionDependentFriction as PositionDependentFriction,
 )
 from .effects.position_dependent_inertia import PositionDependentInertia as PositionDependentInertia
-from .effects.presliding import Dahl as Dahl, LuGre as LuGre
+from .effects.presliding import Dahl as Dahl, LuGre as LuGre, MaxwellSlip as MaxwellSlip
 from .effects.springs import HardeningSpring as HardeningSpring, Spring as Spring
 from .effects.steps import (
     FrictionRamp as FrictionRamp,

@@ -109,8 +109,8 @@ def _windup_bounds(scales):
 
 
 def _flank_bounds(scales):
-    """From bare steel, off which a load comes back with three quarters of its speed, to flanks that
-    it stays at: e^(−πζ/√(1 − ζ²)) of it comes back.
+    """From bare steel, off which a load comes back with three quarters of its speed, to a film of
+    oil that leaves it a seventh.
     """
     return 0.1, 0.95
 
@@ -131,7 +131,7 @@ class ElasticBacklash(AbstractDryLoad):
     load's friction is the column, and its speed, beside the motor's, the momentum (`load_motion`).
     `half_gap` δ, m; `windup` e, m, by which the flanks give way under F_L, so that their stiffness
     is F_L/e; `load_deceleration` d, m/s², at which the load would coast to rest. Off a flank it
-    comes back with half its speed, as from bare steel.
+    comes back with little more than half of its speed.
     """
 
     half_gap: Float[Array, ""] | float = UNKNOWN
