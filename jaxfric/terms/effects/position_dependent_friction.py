@@ -50,6 +50,6 @@ POSITION_DEPENDENT_FRICTION = Effect(
         "friction_period",
         "Friction varies slowly along the stroke",
         "; it does not repeat within the stroke, as with a guide or a belt that is tight in one "
-        "place",
+        "place, or with a load that the place sets",
     ),
 )
