@@ -60,11 +60,27 @@ def summary(
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
     hums = any(each["name"] == FAST_TONE for each in warnings)
     errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
+    if fit["force_error"]["before"] >= NOTHING and not severe:
+        errors = f"{errors} {nothing_described(verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
     told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
     more = [] if told else _more_there(fit, verdict)
     elsewhere = _not_determined(fit, verdict, findings, told)
     return " ".join([*whole, *(elsewhere or _of_a_moment(findings, fit) or more)])
+
+
+# With this error, relative to the force, a model is no better than none: zero errs by as much.
+NOTHING = 1.0
+
+
+def nothing_described(verdict: str) -> str:
+    """That the baseline describes nothing of the force, and what to check where nothing else
+    accounts for it.
+    """
+    said = "Before, the model describes nothing of this force: zero would err no more."
+    if verdict == "explained":
+        return said
+    return f"{said} Check the sign, the unit and the column of the force first."
 
 
 def _not_confirmed(findings: Sequence[Finding]) -> str:
