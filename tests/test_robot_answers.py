@@ -132,6 +132,27 @@ def test_the_table_has_what_the_file_leaves_by_itself():
     assert "callback" not in robot_text.joints("user.xml", "a.csv", [robot._row(joint(), None)])
 
 
+def test_the_table_has_what_noise_alone_makes_where_that_is_known():
+    elbow = joint()
+    elbow.told.fit["filtered_noise_floor"] = 0.25
+    row = robot._row(elbow, None)
+    assert row["filtered_noise_floor"] == 0.25
+    refused = {"joint": "wrist", "verdict": "refused", "error": "No force."}
+    said = robot_text.joints("user.xml", "a.csv", [row, refused]).splitlines()
+    assert said[2].split()[2:] == ["error", "after", "noise", "held", "out", "after", "what"]
+    assert said[3].split()[2:] == ["60.00%", "30.00%", "25.00%", "62.00%", "32.00%"]
+    assert "Noise: what it alone makes." in said[-1]
+
+
+def test_a_simulator_that_describes_nothing_of_a_joint_is_told():
+    elbow = joint()
+    elbow.told.fit["filtered_force_error"]["before"] = 1.08
+    row = robot._row(elbow, None)
+    said = " ".join(robot_text.joints("user.xml", "a.csv", [row]).split())
+    assert "elbow: Before, the model describes nothing of this force" in said
+    assert "describes_nothing" not in robot._row(joint(), None)
+
+
 def test_the_table_says_where_an_unexplained_joint_errs_and_what_was_refuted():
     places = ("velocity", 0.2, ""), ("force_rate", 0.31, "period 10.9 mm")
     where = [dict(zip(("coordinate", "share", "detail"), each, strict=True)) for each in places]

@@ -11,7 +11,7 @@ from ..data.targets import standard
 from ..explanation import Explanation
 from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..explanation.springs import DOUBTED
-from ..explanation.wording import HOLDS_MORE, NOTHING, nothing_described, unexplained
+from ..explanation.wording import HOLDS_MORE, describes_nothing, nothing_described, unexplained
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -155,7 +155,8 @@ def _unexplained(told: Explanation) -> dict[str, str]:
 
 def _describes_nothing(told: Explanation) -> dict[str, str]:
     """That the simulator as it is describes nothing of a joint's force, where it does not."""
-    if told.fit["filtered_force_error"]["before"] < NOTHING or _severe(told):
+    before = told.fit["filtered_force_error"]["before"]
+    if _severe(told) or not describes_nothing(before, told.fit.get("filtered_noise_floor")):
         return {}
     return {"describes_nothing": nothing_described(told.verdict)}
 

@@ -60,7 +60,7 @@ def summary(
     refuted = [_not_confirmed(not_confirmed)] if not_confirmed else []
     hums = any(each["name"] == FAST_TONE for each in warnings)
     errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
-    if fit["force_error"]["before"] >= NOTHING and not severe:
+    if not severe and describes_nothing(fit["force_error"]["before"], fit.get("noise_floor")):
         errors = f"{errors} {nothing_described(verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
     told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
@@ -71,6 +71,13 @@ def summary(
 
 # With this error, relative to the force, a model is no better than none: zero errs by as much.
 NOTHING = 1.0
+
+
+def describes_nothing(before: float, noise: float | None) -> bool:
+    """Whether a baseline with this force error is no better than none, and it is not the noise
+    that most of that is.
+    """
+    return before >= NOTHING and not (noise or 0.0) ** 2 > 0.5 * before**2
 
 
 def nothing_described(verdict: str) -> str:
