@@ -8,6 +8,7 @@ import pytest
 from jaxfric.data import io
 from jaxfric.data.columns import assign, unknown_units
 from jaxfric.data.roles import describe, other_unit, stated_unit
+from jaxfric.online.feed import Feed
 
 # Letters that are prefixes too, symbols of signals, and words.
 NAMES = ["M", "m", "k", "u", "c", "d", "n", "P", "F", "T", "mu", "phi", "da", "drive", "axis 3"]
@@ -130,3 +131,10 @@ def test_the_proposal_reads_the_log(tmp_path):
         io.read(path)
     found = io.read(path, columns={"time": "Sample", "force": "Load (lbf)"})
     assert found.unit_names == {"force": "lbf", "position": "in"}
+
+
+def test_a_stream_tells_what_its_names_leave_open():
+    head = "t,x_mm,drive_k_Nm"
+    stream = Feed([head], {"force": "drive_k_Nm"})
+    assert "may be in N·m or in kN·m" in stream.served and stream.units["force"] == "N·m"
+    assert "may be" not in Feed([head], {"force": "drive_k_Nm"}, units={"force": "N·m"}).served

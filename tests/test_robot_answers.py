@@ -11,6 +11,7 @@ from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import percent
 from jaxfric.export import errors
 from jaxfric.identification.uncertainty import Estimate
+from jaxfric.report import robot as pages
 from jaxfric.simulators import Attribute
 from jaxfric.simulators.weights import Weight
 
@@ -142,6 +143,8 @@ def test_the_table_has_what_noise_alone_makes_where_that_is_known():
     assert said[2].split()[2:] == ["error", "after", "noise", "held", "out", "after", "what"]
     assert said[3].split()[2:] == ["60.00%", "30.00%", "25.00%", "62.00%", "32.00%"]
     assert "Noise: what it alone makes." in said[-1]
+    page = pages.render("user.xml", "a.csv", [row, refused], {}, [])
+    assert ">25.00%<" in page and "Noise: what it alone makes." in page
 
 
 def test_a_simulator_that_describes_nothing_of_a_joint_is_told():
