@@ -114,6 +114,8 @@ FLAT = np.zeros(5)
          "'position=a b,time=Name'", "rises all along"),
         ({"Sample": RISING, "other": RISING, "x": FLAT, "f": FLAT}, {}, "time=NAME", "--rate"),
         ({"t": RISING, "x": FLAT, "a_kN": FLAT, "b_kN": FLAT}, {}, "force=NAME", "a_kN"),
+        ({"t": RISING, "carriage_mm": FLAT, "F_cmd [kN]": FLAT}, {},
+         "'force=F_cmd [kN],position=carriage_mm'", "is the commanded force"),
         ({"t": RISING, "f": FLAT, "status_in": FLAT}, {}, "position=NAME", "status_in"),
     ],
 )  # fmt: skip

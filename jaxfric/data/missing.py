@@ -41,7 +41,6 @@ def check_needed(
     raise ValueError(
         f"{source}: no column is recognised as {' nor as '.join(wanted)}. The columns are: "
         f"{listed(names)}. Name them: --columns {whole}.{reasons}{clock}"
-        + ("" if {"force"} & (set(chosen) | set(likely)) else _commanded(names))
     )
 
 
@@ -59,6 +58,12 @@ def _likely(
         if len(fitting) == 1:
             found[role] = fitting[0]
             reasons += f" {fitting[0]!r} is the only one in a unit of {role}."
+        elif role == "force" and len(told := _commanded(names)) == 1:
+            found[role] = told[0]
+            reasons += (
+                f" {told[0]!r} is the commanded force; where the drive gives what it is told, that "
+                "will do."
+            )
     if "time" in missing and "time" not in found:
         rising = {n: step for n in free if n in values and (step := _rise(values[n])) is not None}
         if len(rising) == 1:
@@ -92,17 +97,12 @@ def option(columns: Mapping[str, str | None]) -> str:
     return value if '"' not in value and bare.isidentifier() else shlex.quote(value)
 
 
-def _commanded(names: Iterable[str]) -> str:
-    """What to do with the one column that holds the commanded force."""
+def _commanded(names: Iterable[str]) -> list[str]:
+    """The columns that hold the commanded force."""
     found = []
     for name in names:
         words = words_of(name)
         rest = [word for word in words if word not in WANTED]
         if len(rest) < len(words) and role_of_words(rest) == "force":
             found.append(name)
-    if len(found) != 1:
-        return ""
-    return (
-        f" {found[0]!r} is the commanded force; where the drive gives what it is told, that will "
-        f"do: --columns {option({'force': found[0]})}."
-    )
+    return found
