@@ -65,7 +65,8 @@ def _likely(
                 "will do."
             )
     if "time" in missing and "time" not in found:
-        rising = {n: step for n in free if n in values and (step := _rise(values[n])) is not None}
+        others = [name for name in free if name in values and name not in found.values()]
+        rising = {n: step for n in others if (step := _rise(values[n])) is not None}
         if len(rising) == 1:
             ((found["time"], step),) = rising.items()
             reasons += (
