@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 
 from jaxfric.data import io
-from jaxfric.data.columns import assign, describe, units
+from jaxfric.data.columns import assign, units
+from jaxfric.data.roles import describe
 from jaxfric.data.tables import load
 
 DATA = Path(os.environ.get("JAXFRIC_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -11,10 +11,10 @@ import jaxfric as jf
 from jaxfric.cli import main
 from jaxfric.cli.commands import working
 from jaxfric.cli.examples import EXAMPLES
-from jaxfric.data.columns import describe
 from jaxfric.data.io import read_with_notes
 from jaxfric.data.languages import english
 from jaxfric.data.nearest import meant
+from jaxfric.data.roles import describe
 
 from .test_cli import write_axis
 

@@ -11,6 +11,7 @@ from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import percent
 from jaxfric.export import errors
 from jaxfric.identification.uncertainty import Estimate
+from jaxfric.report import robot as pages
 from jaxfric.simulators import Attribute
 from jaxfric.simulators.weights import Weight
 
@@ -130,6 +131,29 @@ def test_the_table_has_what_the_file_leaves_by_itself():
                                "held", "out", "after", "callback", "what"]  # fmt: skip
     assert said[3].split()[2:] == ["60.00%", "50.00%", "10.00%", "62.00%", "50.00%", "10.00%"]
     assert "callback" not in robot_text.joints("user.xml", "a.csv", [robot._row(joint(), None)])
+
+
+def test_the_table_has_what_noise_alone_makes_where_that_is_known():
+    elbow = joint()
+    elbow.told.fit["filtered_noise_floor"] = 0.25
+    row = robot._row(elbow, None)
+    assert row["filtered_noise_floor"] == 0.25
+    refused = {"joint": "wrist", "verdict": "refused", "error": "No force."}
+    said = robot_text.joints("user.xml", "a.csv", [row, refused]).splitlines()
+    assert said[2].split()[2:] == ["error", "after", "noise", "held", "out", "after", "what"]
+    assert said[3].split()[2:] == ["60.00%", "30.00%", "25.00%", "62.00%", "32.00%"]
+    assert "Noise: what it alone makes." in said[-1]
+    page = pages.render("user.xml", "a.csv", [row, refused], {}, [])
+    assert ">25.00%<" in page and "Noise: what it alone makes." in page
+
+
+def test_a_simulator_that_describes_nothing_of_a_joint_is_told():
+    elbow = joint()
+    elbow.told.fit["filtered_force_error"]["before"] = 1.08
+    row = robot._row(elbow, None)
+    said = " ".join(robot_text.joints("user.xml", "a.csv", [row]).split())
+    assert "elbow: Before, the model describes nothing of this force" in said
+    assert "describes_nothing" not in robot._row(joint(), None)
 
 
 def test_the_table_says_where_an_unexplained_joint_errs_and_what_was_refuted():

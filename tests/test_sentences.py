@@ -6,7 +6,8 @@ import types
 import numpy as np
 import pytest
 
-from jaxfric.explanation import errors, reported, summary, wording
+from jaxfric.checks.kinds import places, remarks
+from jaxfric.explanation import errors, reported, structure, summary, wording
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
 from jaxfric.explanation.sentences import factor_sentence, mismatch_sentence, sentence
@@ -133,7 +134,7 @@ def test_a_load_that_is_damped_much_does_not_swing(damping, swings):
         "damping_ratio": estimate(damping, 0.01, "1"),
     }
     told = sentence("compliance", values, 0.05, ())
-    assert ("The load swings" in told) == swings and "4.57 Hz" in told
+    assert ("the load swings" in told) == swings and "4.57 Hz" in told
 
 
 @pytest.mark.parametrize(
@@ -399,3 +400,84 @@ def test_a_law_that_acts_more_on_the_held_out_recording_may_lack_something_there
     assert remark.text.count("Explain that one") == 1
     fit["filtered_holdout_force_error"] = {"before": 0.2, "after": 0.1}
     assert "compliance" not in summary._elsewhere(fit, [finding])[0].text
+
+
+def test_the_harmonics_of_a_wave_that_are_known_and_not_small_are_told():
+    values = {
+        "amplitude": estimate(24.2, 0.05, "mA"),
+        "amplitude_harmonic2": estimate(0.4, 0.05, "mA"),  # under a tenth
+        "amplitude_harmonic3": estimate(14.5, 0.05, "mA"),
+        "pitch": estimate(24.0, 1e-3, "mm"),
+    }
+    said = sentence("cogging", values, 0.9, (), Extent(0.0, 200.0, 100.0))
+    assert "amplitude 24.20 mA ± 0.10 mA, with a third harmonic of 14.50 mA ± 0.10 mA: cog" in said
+    assert "second" not in said
+    values["amplitude_harmonic3"] = estimate(14.5, 10.0, "mA")  # may be none
+    assert "harmonic" not in sentence("cogging", values, 0.9, (), Extent(0.0, 200.0, 100.0))
+
+
+def test_how_far_a_load_wanders_is_told_where_it_is_known():
+    known = {"load_drift_1": estimate(0.7, 0.1, "N"), "range_over_record": estimate(1.4, 0.1, "N")}
+    said = sentence("load_drift", known, 0.2, ())
+    assert "over the record, by 1.40 N ± 0.20 N from its least to its greatest;" in said
+    known["range_over_record"] = estimate(1.4, 1.0, "N")
+    assert sentence("load_drift", known, 0.2, ()).startswith(
+        "A constant force wanders slowly over the record; 20%"
+    )
+
+
+@pytest.mark.parametrize("damping", [0.05, 1.2])
+def test_a_resonance_that_is_not_known_is_a_frequency(damping):
+    values = {
+        "load_resonance": estimate(40.0, math.inf, "Hz"),
+        "damping_ratio": estimate(damping, 0.01, "1"),
+    }
+    said = sentence("compliance", values, 0.9, ())
+    assert "at a frequency that this recording cannot tell" in said
+    assert quantity(estimate(1.0, math.inf, "s")) == "a time that this recording cannot tell"
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "listed"),
+    [
+        ("spring", {"stiffness": (4.0, 0.1, "N/m")}, True),
+        ("spring", {"stiffness": (4.0, 3.0, "N/m")}, False),
+        ("spring", {"stiffness": (4.0, math.inf, "N/m")}, False),
+        ("cogging", {"cogging_sin": (0.1, 3.0, "N"), "amplitude": (9.0, 1.0, "N")}, True),
+        ("cogging", {"cogging_sin": (0.1, 3.0, "N"), "amplitude": (9.0, 8.0, "N")}, False),
+    ],
+)
+def test_what_was_refuted_and_may_be_of_no_size_is_not_listed(effect, values, listed):
+    known = {name: estimate(*value) for name, value in values.items()}
+    refuted = [Finding(effect, "", "", (), "", known, 0.1, None, 0.002, confirmed=False)]
+    assert reported.with_size(refuted) == refuted * listed
+
+
+def test_a_finding_that_takes_nothing_off_the_rows_is_no_place_where_the_baseline_errs():
+    first = types.SimpleNamespace(energy=4.0, residual=np.zeros(4))
+    share = Finding("cogging", "", "", (), "", {}, 0.25, None, 0.002)
+    (place,) = structure.with_findings([], [share], first)
+    assert place["coordinate"] == "position" and place["size"] == 0.5
+    assert structure.with_findings([], [share._replace(share=-0.75)], first) == []
+
+
+@pytest.mark.parametrize(
+    ("before", "noise", "verdict", "said", "check"),
+    [
+        (1.0, 0.1, "partly_explained", True, True),
+        (1.2, 0.1, "explained", True, False),
+        (0.99, 0.1, "partly_explained", False, False),
+        (1.0, 0.9, "consistent", False, False),  # that is noise
+    ],
+)
+def test_a_baseline_that_describes_nothing_is_told(before, noise, verdict, said, check):
+    fit = {"force_error": {"before": before, "after": 0.05}, "noise_floor": noise}
+    text = wording.summary(verdict, "gaussian", [], [], fit, [])
+    assert ("describes nothing of this force" in text) == said
+    assert ("Check the sign, the unit and the column" in text) == check
+
+
+@pytest.mark.parametrize(("value", "words"), [(-0.0242, "0.0242 s later"), (0.5, "0.5 s earlier")])
+def test_a_force_is_taken_later_or_earlier(value, words):
+    (remark,) = remarks(places({"force_late": value}), {"force": "N", "position": "m"})
+    assert remark.text.startswith(f"Taken {words}, the force")

@@ -72,6 +72,30 @@ def test_the_curve_is_known_where_amplitude_and_period_are_not():
     assert parts[0] > 10 * parts[1]
 
 
+def test_a_load_that_wanders_is_told_by_how_far_it_moves():
+    """Its error is what the same noise makes of the range, in the mean of 200 draws."""
+    time, law = np.linspace(0.0, 20.0, 400), terms.LoadDrift(0.0, 20.0, 3)
+    alpha = np.array([0.7, -0.2, 0.1])
+    motion = Recording(jnp.asarray(time), *jnp.zeros((2, 400)), jnp.ones(400))
+    with jax.enable_x64(True):
+        columns = np.asarray(law.columns(motion))
+    both = np.concatenate([np.ones((400, 1)), columns], axis=1)
+    noise = 0.1 * np.random.default_rng(2).normal(size=(200, 400))
+    residual = noise[0] - both @ np.linalg.lstsq(both, noise[0])[0]
+    current = Fit(
+        (terms.Offset(), law), (np.zeros(0),) * 2, (np.array([3.0]), alpha), both,
+        np.zeros((400, 0)), residual, float(residual @ residual),
+    )  # fmt: skip
+    with jax.enable_x64(True):
+        limits = LIMITS._replace(start=0.0)
+        found = parameters.estimates(current, np.arange(400) // 17, UNITS, limits)[1]
+    moved = found["range_over_record"]
+    assert float(moved.value) == pytest.approx(np.ptp(columns @ alpha), rel=1e-3)
+    drawn = [np.ptp(columns @ (alpha + np.linalg.lstsq(both, n)[0][1:])) for n in noise]
+    assert float(moved.standard_error) == pytest.approx(np.std(drawn), rel=0.4)
+    assert moved.unit == "N"
+
+
 def test_terms_that_overlap_are_told_together():
     with jax.enable_x64(True):
         current = fitted([WAVE, STOP])

@@ -6,8 +6,9 @@ import pytest
 
 from jaxfric import units
 from jaxfric.data import io
-from jaxfric.data.columns import describe, stated_unit, unknown_units
+from jaxfric.data.columns import unknown_units
 from jaxfric.data.recording import Recording, check_same_units
+from jaxfric.data.roles import describe, stated_unit
 from jaxfric.units import Dimension, is_rotary, spell
 
 ROTARY = {"force": "N·m", "position": "rad"}

@@ -10,8 +10,9 @@ import numpy as np
 class Kind(NamedTuple):
     """A fault: its name, whether results beside it are certain to be wrong, and its sentence.
 
-    In the sentence `{value}` is the number found, `{force}` and `{position}` are the units, `{at}`
-    is the number of the kind `NAME_at`. A kind without a sentence is such a number.
+    In the sentence `{value}` is the number found, `{size}` the same without its sign, `{sooner}`
+    says "earlier", or "later" where it is negative, `{force}` and `{position}` are the units,
+    `{at}` is the number of the kind `NAME_at`. A kind without a sentence is such a number.
     """
 
     name: str
@@ -247,10 +248,10 @@ KINDS = (
     Kind(
         "force_late",
         False,
-        "Taken {value:.3g} s earlier (later, if negative), the force leaves half as much beyond "
-        "the noise: force and motion were logged with different delays, or one of them through a "
-        "filter. The intervals hold, to first order, what that makes of the parameters. Shift one "
-        "of them; jaxfric explain tells more.",
+        "Taken {size:.3g} s {sooner}, the force leaves half as much beyond the noise: force and "
+        "motion were logged with different delays, or one of them through a filter. The intervals "
+        "hold, to first order, what that makes of the parameters. Shift one of them; jaxfric "
+        "explain tells more.",
     ),
     Kind(
         "force_stamped",
@@ -388,6 +389,8 @@ def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
         if np.isnan(value) or not kind.text:
             continue
         at = numbers.get(f"{kind.name}_at", np.nan)
-        text = kind.text.format(value=value, at=at, guess=_guess(kind.name, value), **units)
+        words = {"size": abs(value), "sooner": "later" if value < 0 else "earlier"}
+        guess = _guess(kind.name, value)
+        text = kind.text.format(value=value, at=at, guess=guess, **words, **units)
         found.append(Remark(kind.name, text, kind.severe))
     return tuple(sorted(found, key=lambda remark: not remark.severe))

@@ -11,7 +11,7 @@ from ..data.targets import standard
 from ..explanation import Explanation
 from ..explanation.contradictions import CONTRADICTION, with_contradictions
 from ..explanation.springs import DOUBTED
-from ..explanation.wording import HOLDS_MORE, unexplained
+from ..explanation.wording import HOLDS_MORE, describes_nothing, nothing_described, unexplained
 from ..export.patch import Again, Patch, patch
 from ..identification import documents, tabulate
 from ..report import page, robot
@@ -135,11 +135,13 @@ def _row(joint: Joint, done: Patch | None) -> dict[str, Any]:
         "findings": [*_severe(joint.told), *map(_said, joint.told.findings)],
         "filtered_force_error": errors["filtered_force_error"],
         "filtered_holdout_force_error": errors["filtered_holdout_force_error"],
+        "filtered_noise_floor": errors.get("filtered_noise_floor"),
         "corrected_before": list(joint.corrected),
         "actuator": [] if joint.simulator is None else joint.simulator.standing,
         "still": list(joint.still),
         "contradicted": [w["text"] for w in joint.told.warnings if w["name"] in DOUBTS],
         **_unexplained(joint.told),
+        **_describes_nothing(joint.told),
         **written,
     }
 
@@ -149,6 +151,14 @@ def _unexplained(told: Explanation) -> dict[str, str]:
     if told.verdict != "unexplained" or _severe(told):
         return {}
     return {"unexplained": unexplained(told.where, told.not_confirmed)}
+
+
+def _describes_nothing(told: Explanation) -> dict[str, str]:
+    """That the simulator as it is describes nothing of a joint's force, where it does not."""
+    before = told.fit["filtered_force_error"]["before"]
+    if _severe(told) or not describes_nothing(before, told.fit.get("filtered_noise_floor")):
+        return {}
+    return {"describes_nothing": nothing_described(told.verdict)}
 
 
 def _severe(told: Explanation) -> list[str]:

@@ -1,5 +1,6 @@
 """What `jaxfric explain --mujoco` prints of a robot: plain aligned text."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,16 +12,19 @@ from ..looks.text import aligned, wrapped
 def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
     """What a simulator's joints and a log differ in, a row each."""
     after = ["after", *["callback"] * any("callback" in row for row in rows)]
-    table = [["joint", "verdict", "error", *after, "held out", *after, "what"]]
+    noise = ["noise"] * any(row.get("filtered_noise_floor") is not None for row in rows)
+    table = [["joint", "verdict", "error", *after, *noise, "held out", *after, "what"]]
     for row in rows:
-        cells = [""] * 2 * (1 + len(after))
+        cells = [""] * (2 * (1 + len(after)) + len(noise))
         if "error" not in row:
-            errors = [_with_file(row, name) for name in ("force_error", "holdout_force_error")]
-            cells = [percent(e[w]) if w in e else "" for e in errors for w in ("before", *after)]
+            here, held = (_with_file(row, name) for name in ("force_error", "holdout_force_error"))
+            cells = [_cell(here.get(w)) for w in ("before", *after)]
+            cells += [_cell(row.get("filtered_noise_floor"))] * len(noise)
+            cells += [_cell(held.get(w)) for w in ("before", *after)]
         below = "see below" * any(row.get(key) for key in ("error", "findings", "unexplained"))
         table.append([row["joint"], row["verdict"], *cells, below])
     lines = [f"{printable(simulator)} against {printable(log)}", ""]
-    lines += aligned(table, range(2, 4 + 2 * len(after)))
+    lines += aligned(table, range(2, 4 + 2 * len(after) + len(noise)))
     every = [each for row in rows for each in row.get("findings", ())]
     shared = {each for each in every if every.count(each) > 1}  # said of several joints together
     lines += [
@@ -30,6 +34,8 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         said = [row["error"]] if "error" in row else row["findings"]
         for each in said:
             lines += [] if each in shared else ["", *wrapped(f"{row['joint']}: {each}")]
+        if row.get("describes_nothing"):
+            lines += ["", *wrapped(f"{row['joint']}: {row['describes_nothing']}")]
         if row.get("unexplained"):
             more = f"More by --joint {row['joint']}."
             lines += ["", *wrapped(f"{row['joint']}: {row['unexplained']} {more}")]
@@ -41,10 +47,15 @@ def joints(simulator: str, log: str, rows: Sequence[Mapping[str, Any]]) -> str:
         for each in dict.fromkeys(text for row in rows for text in row.get(name, ())):
             lines += ["", *wrapped(each)]
     note = "Force errors through the kernel by which effects are looked for."
+    note += " Noise: what it alone makes." * bool(noise)
     note += " After: of the file as it was written." * any("file" in row for row in rows)
     note += " Callback: with it beside the file." * (len(after) > 1)
     lines += ["", *wrapped(note)]
     return "\n".join(lines)
+
+
+def _cell(error: float | None) -> str:
+    return "" if error is None or math.isnan(error) else percent(error)
 
 
 def _with_file(row: Mapping[str, Any], name: str) -> Mapping[str, float]:

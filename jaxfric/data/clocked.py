@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from .columns import describe
 from .delimited import Table
+from .roles import describe
 
 # A name that no file has.
 CLOCK = "time [s] (stated rate)"

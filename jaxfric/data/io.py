@@ -19,6 +19,7 @@ from .per_second import per_second
 from .printable import encodable
 from .provenance import sha256
 from .recording import Recording
+from .roles import stated_unit
 from .spellings import unit_of
 from .tables import IN_MEMORY, in_memory, load
 from .turns import angles
@@ -122,7 +123,7 @@ def read_with_notes(
     else:
         table, path, source = in_memory(path), Path(IN_MEMORY), IN_MEMORY
     scale, units, period = dict(scale or {}), dict(units or {}), dict(period or {})
-    own = list(table.columns)
+    own, given = list(table.columns), dict(units)
     if rate is not None:
         table = clocked(table, rate, columns, source)
         columns = dict(columns or {}) | {"time": CLOCK}
@@ -139,7 +140,7 @@ def read_with_notes(
     time, counted, in_seconds = _time(table, chosen, scale, path)
     scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
     notes = [names.served(chosen, scale, named, own)] if served else []
-    notes += table.notes + names.unknown_units(chosen, scale) + counted
+    notes += table.notes + names.unknown_units(chosen, scale, given) + counted
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
         for role, name in chosen.items()
@@ -215,7 +216,7 @@ def _time(table: Table, chosen, scale, path: Path) -> tuple[np.ndarray, list[str
             column = numbers(column, chosen["time"], path, table.first_row)
         column = stamps.since_1970(column, notes)
         known = bool(notes)
-        if not known and names.stated_unit(chosen["time"], "time") is None:
+        if not known and stated_unit(chosen["time"], "time") is None:
             stamps.check_slow(column, notes)
     return numbers(column, chosen["time"], path, table.first_row), notes, known
 

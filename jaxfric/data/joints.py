@@ -7,8 +7,8 @@ A column's name is a joint's name and the name of a role, in either order, with 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from .columns import describe
 from .printable import listed
+from .roles import describe
 from .spellings import apart
 
 ROLES = ("position", "force")

@@ -4,7 +4,8 @@ import math
 from collections.abc import Mapping
 
 from ..units import factor
-from .columns import stated_unit, units as named_units
+from .columns import units as named_units
+from .roles import stated_unit
 
 _SECONDS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
 

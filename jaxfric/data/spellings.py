@@ -1,6 +1,7 @@
 """How loggers spell units, in English and German, and which unit fits which signal.
 
 A name may spell a unit in capitals and small letters, `torque_mNm`: [`apart`][] keeps it whole.
+A prefix stands close to its unit: the M of `M_Nm` is a name, and `mN_m` is a product of two units.
 """
 
 import re
@@ -53,6 +54,16 @@ _PER_MINUTE = re.compile(
     r"^(.+?)(?:/min(?:ute)?|[_ ·*]?min(?:\^?-1|⁻¹)|[_ ]per[_ ]min(?:ute)?|_min)$"
 )
 
+# A product with a sign between its factors: a force and a length, in the order of `_UNITS`.
+_FACTORS = (
+    frozenset("n mn kn un µn μn cn lb lbf kg kgf oz ozf ft in".split()),
+    frozenset("m mm cm in ft lb lbf oz ozf".split()),
+)
+# The only letter that is another prefix as a capital: a meganewton is no millinewton.
+_MEGA = re.compile(r"MN(?:[_ ·⋅*.-]?m)?")
+# A torque, never a nanometre. All in capitals or small letters either may be meant.
+_TORQUE = re.compile(r"N[_ ·⋅*.-]?m")
+
 # Prefix and unit of a force, in mixed case.
 _MIXED = r"(?:da|[nuµμmcdkM])(?:N(?:cm|mm?|M)?|A|V)(?![^\W_])"
 _JOINED = re.compile(
@@ -99,18 +110,18 @@ def unit_of(text: str, role: str) -> str | None:
 def spelt(text: str, role: str) -> str | None:
     """As [`unit_of`][]; `nm` is newton metre on a force and nanometre on a position."""
     raw, text = text.strip(), text.strip().lower()
-    if text == "nm" and role == "force":
+    if role == "force" and text == "nm":
         return "N·m"
-    if role == "force" and raw in ("MN", "MNm"):
-        return {"MN": "MN", "MNm": "MN·m"}[raw]
+    if role == "force" and _MEGA.fullmatch(raw):
+        return "MN" if raw == "MN" else "MN·m"
+    if role != "force" and _TORQUE.fullmatch(raw):
+        return "N·m"
     if raw == "Grad":  # German for degree; in English a gradian, which nobody logs in a capital
         return "deg"
     if text in _UNITS:
         return _UNITS[text]
-    parts = re.split(r"[_ ·⋅*.-]", text)
-    # `mN_m`, `in_lb`; single letters (`i_m_a`) are rather names.
-    if role == "force" and max(map(len, parts)) > 1 and "".join(parts) in _UNITS:
-        return _UNITS["".join(parts)]
+    if role == "force" and (product := _product(text)):
+        return product
     for pattern, per in ((_PER_SECOND, "s"), (_PER_MINUTE, "min")):
         found = pattern.match(text)
         inner = "deg" if found and raw.startswith("Grad") and found[1] == "grad" else None
@@ -118,3 +129,23 @@ def spelt(text: str, role: str) -> str | None:
         if inner:
             return f"{inner}/{per}"
     return None
+
+
+def _product(text: str) -> str | None:
+    """The torque that a force and a length make, `mN_m`, `in_lb`; of `m_Nm` the m is none."""
+    parts = re.split(r"[_ ·⋅*.-]", text)
+    if len(parts) != 2 or any(
+        part not in known for part, known in zip(parts, _FACTORS, strict=True)
+    ):
+        return None
+    unit = _UNITS.get("".join(parts))
+    return unit if unit in TORQUES else None
+
+
+def other_prefix(before: str, text: str, role: str) -> str | None:
+    """The unit that a text would spell with the end of what stands `before` it: for `drive_k_` and
+    `Nm` it is kN·m, for `armNm` mN·m; `None` where the end is no prefix.
+    """
+    found = re.search(r"(?:da|mu|[numkMcµμ])[_ .-]?$", before)
+    prefix = found[0].rstrip("_ .-").replace("mu", "u") if found else ""
+    return unit_of(prefix + text, role) if prefix else None

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 
 from ..units import TURNS
-from .columns import stated_unit
+from .roles import stated_unit
 
 
 def angles(

@@ -73,7 +73,8 @@ class Finding(NamedTuple):
     - `parameters`: by name, each with value, standard error and unit. Of what varies slowly along
       the stroke also by how much it is more than in the middle (`at_low_end`, `at_first_quarter`,
       `at_third_quarter`, `at_high_end`); of warming by how much more at the end of the record than
-      at its start (`over_record`); of wrong values that are one factor that (`force_factor`).
+      at its start (`over_record`); of a load that wanders how far it moves (`range_over_record`);
+      of wrong values that are one factor that (`force_factor`).
     - `share`: part of the baseline's mean-square residual that it removes; `holdout_share`: the
       same on the held-out recording, `None` without one or where the effect is of the moment.
     - `p_value`: paid for by the number of terms tried.

@@ -15,7 +15,7 @@ from ..units import spell
 from .intervals import spread
 from .regression import Fit
 from .significance import BLOCKS
-from .slow_changes import along, over_record
+from .slow_changes import along, over_record, range_of
 
 
 def whole(current: Fit) -> AbstractTerm:
@@ -58,6 +58,7 @@ def estimates(
         if limits is not None and n:
             found |= along(current, n, known, units, limits)
             found |= over_record(current, n, known, units, limits)
+            found |= range_of(current, n, known, units, limits)
         result.append(found)
     return result
 

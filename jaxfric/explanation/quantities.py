@@ -14,6 +14,8 @@ _SMALLER = {
     "A": (("mA", 1e-3),),
 }
 UNSEEN = "an amount that this recording cannot tell"
+# What is not known, in words, by its unit.
+_KINDS = {"Hz": "a frequency", "1/s": "a frequency", "s": "a time"}
 # Below this, a smaller unit is used.
 SMALL = 0.05
 
@@ -25,7 +27,7 @@ def quantity(estimate: Estimate, smaller: bool = True) -> str:
     """
     value, error = float(estimate.value), float(estimate.standard_error)
     if math.isinf(error):  # the data cannot see it, and its value is any
-        return UNSEEN
+        return unseen(estimate)
     half = float(estimate.half_width()) if error > 0 else 0.0
     name, scale = _unit(estimate.unit, max(abs(value), half) if smaller else 1.0)
     value, half = value / scale, half / scale
@@ -36,6 +38,11 @@ def quantity(estimate: Estimate, smaller: bool = True) -> str:
     if abs(value) >= 1e5 or 0 < abs(value) < 1e-3:
         return f"{value:.3g}{unit} ± {half:.1g}{unit}"
     return f"{value:.{digits}f}{unit} ± {half:.{digits}f}{unit}"
+
+
+def unseen(estimate: Estimate) -> str:
+    """In place of a value that is not known: "a time that this recording cannot tell"."""
+    return UNSEEN.replace("an amount", _KINDS.get(estimate.unit, "an amount"))
 
 
 def _unit(unit: str, size: float) -> tuple[str, float]:

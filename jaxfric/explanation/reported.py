@@ -1,12 +1,12 @@
 """Findings as they are reported: parameters with their errors, shares, sentences."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ..identification.uncertainty import Estimate
-from ..terms.effect import Effect, Extent
+from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from ..units import spell
@@ -20,7 +20,7 @@ from .finding import Finding, Moved
 from .findings import Findings
 from .improvement import Errors, Improved
 from .mismatch import Mismatch
-from .quantities import quantity, rise
+from .quantities import nil, quantity, rise
 from .regression import Fit
 from .selection import SelectedTerm
 from .sentences import changed_sentence, factor_sentence, mismatch_sentence, sentence, spoken
@@ -113,6 +113,23 @@ def not_confirmed(better: Improved) -> list[Finding]:
         )
         for n in better.refuted
     ]
+
+
+def with_size(refuted: Sequence[Finding]) -> list[Finding]:
+    """Those of which this recording knows a size, not only that there may be one."""
+    return [finding for finding in refuted if not _of_no_size(finding)]
+
+
+def _of_no_size(finding: Finding) -> bool:
+    """Whether the intervals of all that its force is proportional to hold zero."""
+    terms = EFFECTS[finding.effect].shapes(ANY)
+    affine = {parameter.name for term in terms for parameter in term.affine}
+    sizes = [
+        estimate
+        for name, estimate in finding.parameters.items()
+        if name in affine or name.startswith("amplitude")
+    ]
+    return bool(sizes) and all(nil(e) or not math.isfinite(float(e.standard_error)) for e in sizes)
 
 
 def _beside_rows(better: Improved) -> list[Finding]:

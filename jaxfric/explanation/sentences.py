@@ -11,7 +11,7 @@ from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..terms.slow import CHANGES
 from ..units import FORCE
-from .quantities import UNSEEN, nil, quantity, turns
+from .quantities import UNSEEN, nil, quantity, turns, unseen
 
 NOWHERE = Extent()
 
@@ -49,6 +49,8 @@ def told(effect: Effect, parameters: Mapping[str, Estimate], extent: Extent = NO
     words = {n: _words(effect, n, estimate) for n, estimate in parameters.items()}
     if _beyond(effect, parameters, extent.force):
         words["amplitude"] = UNSEEN
+    elif "amplitude" in words:
+        words["amplitude"] += _harmonics(parameters)
     words |= {f"{n}:gain": _as_gain(estimate) for n, estimate in parameters.items()}
     sizes = {n: e._replace(value=abs(e.value)) for n, e in parameters.items()}
     words |= {f"{n}:size": quantity(estimate) for n, estimate in sizes.items()}
@@ -83,7 +85,7 @@ def _words(effect: Effect, name: str, estimate: Estimate) -> str:
     if sized and nil(estimate):
         return f"at most {quantity(Estimate(max(most, 0.0), 0.0, estimate.unit))}"
     if name in effect.magnitudes and nil(estimate):
-        return UNSEEN
+        return unseen(estimate)
     if name in effect.periods:
         return quantity(estimate) + turns(estimate)
     return quantity(estimate)
@@ -109,6 +111,24 @@ def _beyond(effect: Effect, parameters: Mapping[str, Estimate], force: float) ->
     if amplitude is None or dimensions != {FORCE} or not nil(amplitude):
         return False
     return bool(float(amplitude.interval()[1]) > force)
+
+
+# A hundredth of a wave's power: less is told in the document alone.
+_LEAST = 0.1
+_ORDINALS = {2: "second", 3: "third"}
+
+
+def _harmonics(parameters: Mapping[str, Estimate]) -> str:
+    """The harmonics of a wave that are known and not small: ", with a third harmonic of 2.1 N"."""
+    waves = {n: e for n, e in parameters.items() if n.startswith("amplitude") and not _unseen(e)}
+    most = max((float(estimate.value) for estimate in waves.values()), default=0.0)
+    said = [
+        f"a {_ORDINALS.get(number, f'{number}th')} harmonic of {quantity(estimate)}"
+        for name, estimate in waves.items()
+        if (number := int(name.partition("_harmonic")[2] or 1)) > 1
+        and float(estimate.value) >= _LEAST * most
+    ]
+    return f", with {' and '.join(said)}" if said else ""
 
 
 def _as_gain(more: Estimate) -> str:

@@ -14,13 +14,15 @@ from ..terms.effect import REPEATED
 from ..terms.effects import traits
 from ..terms.position import POSITION_ONLY
 from ..terms.sample import Scales
-from ..terms.slow import ALONG, OVER_RECORD
+from ..terms.slow import ALONG, OVER_RECORD, RANGE
 from ..units import POSITION, spell
 from .intervals import Spread
 from .regression import Fit
 
 # The ends of the stroke, m.
 Stroke = tuple[float, float]
+# Places of a curve over time: more than ten in the shortest wave of a load that wanders.
+MOMENTS = 200
 # By which part of itself a nonlinear parameter is moved for a derivative: the root of the rounding.
 STEP = 1e-7
 
@@ -95,6 +97,27 @@ def over_record(
     weights[0, current.indices(number)[0]] = np.expm1(-past)
     weights[0, current.indices(number)[1 + at]] = size * np.exp(-past) * past / constant
     return _estimates({OVER_RECORD: size * np.expm1(-past)}, weights, term, known, units)
+
+
+def range_of(
+    current: Fit, number: int, known: Spread, units: dict[str, str], limits: Scales
+) -> dict[str, Estimate]:
+    """How far a curve over time alone moves over the record, from its least to its greatest, in its
+    own unit; empty for another term, and where that is not known.
+
+    To first order its error is that of the curve's values at these two moments.
+    """
+    term = current.terms[number]
+    if not traits(term).wanders:
+        return {}
+    times = float(limits.start) + float(limits.duration) * np.linspace(0.0, 1.0, MOMENTS)
+    none = jnp.zeros(MOMENTS)
+    columns = np.asarray(term.columns(Recording(jnp.asarray(times), none, none, none)))
+    curve = columns @ current.alphas[number]
+    high, low = int(np.argmax(curve)), int(np.argmin(curve))
+    weights = np.zeros((1, len(known.covariance)))
+    weights[0, current.indices(number)] = columns[high] - columns[low]
+    return _estimates({RANGE: float(curve[high] - curve[low])}, weights, term, known, units)
 
 
 def _estimates(

@@ -134,12 +134,15 @@ def strongest(
 def with_findings(
     where: list[dict[str, Any]], findings: list[Finding], first: Fit
 ) -> list[dict[str, Any]]:
-    """With the coordinates of findings that no free curve shows: they act at a few rows, say."""
+    """With the coordinates of findings that no free curve shows: they act at a few rows, say.
+
+    What takes nothing off the rows beside the other findings says nothing of where they err.
+    """
     for finding in findings:
         own = [name.removesuffix("_lines") for name in EFFECTS[finding.effect].coordinates]
-        if not own or any(each["coordinate"] in own for each in where):
+        if not own or finding.share <= 0 or any(each["coordinate"] in own for each in where):
             continue
-        power = max(finding.share, 0.0) * first.energy / len(first.residual)
+        power = finding.share * first.energy / len(first.residual)
         each = {
             "coordinate": own[0],
             "share": finding.share,

@@ -23,7 +23,7 @@ from .improvement import Improved, holdout_model
 from .locate import Structure
 from .mismatch import Mismatch
 from .partial_residuals import moved as moved_curve, partial_residuals
-from .reported import NO_POSITION, not_confirmed, reported, wrong_values
+from .reported import NO_POSITION, not_confirmed, reported, with_size, wrong_values
 from .selection import Selection
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
@@ -94,12 +94,15 @@ def summarise(
     where = structure.documents(there, findings, better.first, units, known.structured)
     if verdict == "unexplained" and not where:
         where = structure.strongest(before, units, known.structured)
+    # What accounts for so much, or for what nothing else does, is told whatever its size.
+    kept = verdict == "unexplained" or halved(refuted)
+    listed = refuted if kept else with_size(refuted)
     shown = curves(before.counts[:6], better, models)
     return Explanation(
         verdict=verdict,
         where=where,
         findings=findings,
-        not_confirmed=refuted,
+        not_confirmed=listed,
         fit=errors,
         not_visible=_not_visible(selection, units, absent),
         model=models[1],

@@ -66,11 +66,34 @@ def summary(
     ]
     hums = any(each["name"] == FAST_TONE for each in warnings)
     errors = f"{_errors(fit, bool(findings))}.{'' if hums else _by_sample(fit, verdict)}"
+    if not severe and describes_nothing(fit["force_error"]["before"], fit.get("noise_floor")):
+        errors = f"{errors} {nothing_described(verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
     told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
     more = [] if told else _more_there(fit, verdict)
     elsewhere = _not_determined(fit, verdict, findings, told)
     return " ".join([*whole, *(elsewhere or _of_a_moment(findings, fit) or more)])
+
+
+# With this error, relative to the force, a model is no better than none: zero errs by as much.
+NOTHING = 1.0
+
+
+def describes_nothing(before: float, noise: float | None) -> bool:
+    """Whether a baseline with this force error is no better than none, and it is not the noise
+    that most of that is.
+    """
+    return before >= NOTHING and not (noise or 0.0) ** 2 > 0.5 * before**2
+
+
+def nothing_described(verdict: str) -> str:
+    """That the baseline describes nothing of the force, and what to check where nothing else
+    accounts for it.
+    """
+    said = "Before, the model describes nothing of this force: zero would err no more."
+    if verdict == "explained":
+        return said
+    return f"{said} Check the sign, the unit and the column of the force first."
 
 
 def _not_confirmed(findings: Sequence[Finding], recurs: bool) -> str:

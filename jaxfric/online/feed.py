@@ -126,8 +126,9 @@ class Feed:
         chosen, scale = names.assign(header, columns, source), dict(scale or {})
         implied, named = per_second(chosen, scale, units or {}, source)
         self.units = names.units(chosen, scale, named)
+        doubts = names.unknown_units(chosen, scale, units)
         scale = implied | scale
-        self.served = names.served(chosen, scale, self.units, header)
+        self.served = " ".join([names.served(chosen, scale, self.units, header), *doubts])
         self._source, self._width = source, len(header)
         self._index = {
             role: (header.index(chosen[role]), scale.get(role, 1.0))

@@ -1,5 +1,6 @@
 """The page of a robot: a table of its joints, each with a link to its own page."""
 
+import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -43,9 +44,10 @@ def render(
 <section>
 <table>
 <tr><th>joint</th><th>verdict</th><th class="number">force error</th>
-<th class="number">held out</th><th>what</th></tr>
+<th class="number">noise</th><th class="number">held out</th><th>what</th></tr>
 {body}</table>
-<p class="note">Force errors before → after, through the kernel by which effects are looked for.</p>
+<p class="note">Force errors before → after, through the kernel by which effects are looked for.
+Noise: what it alone makes.</p>
 </section>
 {f"<section><h2>The simulator's file</h2><ul>{done}</ul></section>" if done else ""}
 {f"<section><h2>Run again</h2>{pictures}</section>{scripts()}" if pictures else ""}
@@ -60,12 +62,15 @@ def _row(row: Mapping[str, Any], link: str | None) -> str:
         joint = f'<a href="{quote(link)}">{joint}</a>'
     if "error" in row:
         text = escape(row["error"])
-        return f'<tr><td>{joint}</td><td>refused</td><td colspan="3">{text}</td></tr>'
-    errors = [
+        return f'<tr><td>{joint}</td><td>refused</td><td colspan="4">{text}</td></tr>'
+    here, held = (
         "" if each is None else f"{percent(each['before'])} → {percent(each['after'])}"
         for each in (row["filtered_force_error"], row["filtered_holdout_force_error"])
-    ]
-    texts = [*row["findings"], *filter(None, [row.get("unexplained")])]
+    )
+    noise = row.get("filtered_noise_floor")
+    errors = [here, "" if noise is None or math.isnan(noise) else percent(noise), held]
+    more = (row.get(name) for name in ("describes_nothing", "unexplained"))
+    texts = [*row["findings"], *filter(None, more)]
     said = "<br>".join(map(escape, texts)) or "–"
     cells = "".join(f'<td class="number">{each}</td>' for each in errors)
     return (

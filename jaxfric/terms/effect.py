@@ -221,6 +221,7 @@ class Effect:
       be nearly all that they leave there.
     - `isolated`: it acts at single moments, as what no law describes of a reversal does too.
     - `ubiquitous`: every axis has some of it; what is no larger than the noise is a part of that.
+    - `wanders`: it is a smooth curve over time, told by how far that moves over the record.
     - `idealised`: models idealise it; what of it makes no more of the force than noise does is told
       as a part of the baseline.
     - `several`: there may be more than one of it, as of two end stops.
@@ -278,6 +279,7 @@ class Effect:
     local: bool = False
     isolated: bool = False
     ubiquitous: bool = False
+    wanders: bool = False
     idealised: bool = False
     several: bool = False
     by_parameter: bool = False

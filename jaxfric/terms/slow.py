@@ -8,8 +8,10 @@ from .effect import REPEATED, Extent
 ALONG = {"at_low_end": -1.0, "at_first_quarter": -0.5, "at_third_quarter": 0.5, "at_high_end": 1.0}
 # What settles is at the end of the record so much more than at its start.
 OVER_RECORD = "over_record"
+# A force of time alone moves so far over the record, from its least to its greatest.
+RANGE = "range_over_record"
 # Changes, of which nothing is told that may be nil.
-CHANGES = (*ALONG, OVER_RECORD)
+CHANGES = (*ALONG, OVER_RECORD, RANGE)
 _PLACES = "at its low end", "at a quarter of it", "at three quarters", "at its high end"
 
 

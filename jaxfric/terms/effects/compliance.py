@@ -261,8 +261,9 @@ def creeping(values: Mapping[str, float], extent: Extent) -> str | None:
     if values.get("damping_ratio", 0.0) < SWINGING:
         return None
     return (
-        "A part of the mass follows the drive late, with {load_resonance} and a damping ratio of "
-        "{damping_ratio}: too damped to swing, as with rubber, grease or a slipping coupling"
+        "A part of the mass follows the drive late, with a resonance at {load_resonance} and a "
+        "damping ratio of {damping_ratio}: too damped to swing, as with rubber, grease or a "
+        "slipping coupling"
     )
 
 
@@ -270,8 +271,8 @@ COMPLIANCE = Effect(
     "compliance",
     "M_L r̈, r̈ + 2ζω ṙ + ω² r = −a − (F_L/M_L) sign(v)",
     "reversals",
-    "The load swings on the drive, at {load_resonance} against a held motor, with a damping ratio "
-    "of {damping_ratio}: compliance",
+    "With the motor held the load swings on the drive at {load_resonance}, with a damping ratio of "
+    "{damping_ratio}: compliance",
     laws=(Compliance, DryCompliance),
     scaled=lambda scales: (
         *(Compliance(driven=by) for by in ("inertia", "friction", "both")),

@@ -1,5 +1,6 @@
 """A constant force that wanders."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import equinox as eqx
@@ -9,8 +10,9 @@ from numpy.polynomial import legendre
 
 from ...units import FORCE
 from ..base import AbstractLaw, AbstractTerm
-from ..effect import RECURS, Effect
+from ..effect import RECURS, Effect, Extent
 from ..sample import Parameter, Sample, Scales
+from ..slow import RANGE
 from ..text import literal, signed
 
 
@@ -68,6 +70,16 @@ def shapes(scales: Scales) -> tuple[AbstractTerm, ...]:
     return tuple(LoadDrift(start, duration, degree) for degree in DEGREES)
 
 
+def moved(values: Mapping[str, float], extent: Extent) -> str | None:
+    """Another sentence where it is known how far it moves."""
+    if RANGE not in values:
+        return None
+    return (
+        f"A constant force wanders slowly over the record, by {{{RANGE}}} from its least to its "
+        "greatest"
+    )
+
+
 LOAD_DRIFT = Effect(
     "load_drift",
     "Σ F_n P_n(t)",
@@ -80,4 +92,6 @@ LOAD_DRIFT = Effect(
     separate_by="Record longer.",
     momentary=True,
     ubiquitous=True,
+    wanders=True,
+    variant=moved,
 )
