@@ -154,6 +154,19 @@ def test_a_soft_knee_is_no_hard_limit(motion):
     assert "force_limit" not in wrong(check_logs([Part(recording, None, Known(force[:, 1]))])[0])
 
 
+def test_a_load_that_is_picked_up_is_no_hard_limit(motion):
+    """A light joint needs three times its inertia's force then, of which none is at one level."""
+    time, position, force = motion
+    speed = np.gradient(position[:, 1], time)
+    inertial = np.gradient(speed, time)
+    dry = np.std(inertial) * np.sign(speed)
+    known = dry + inertial
+    heavier = known + np.where(time > 0.5 * time[-1], 2 * inertial, 0)
+    recording = Recording(time, heavier, position[:, 1], units=UNITS)
+    (checked,) = check_logs([Part(recording, None, Known(known))])
+    assert "force_limit" not in wrong(checked)
+
+
 def test_friction_of_another_level_is_no_hard_limit(motion):
     """Where friction is nearly all of the force, what it is more by is like a command cut off."""
     time, position, force = motion

@@ -33,25 +33,32 @@ def repeated_after(recording: Recording) -> float:
     count, step = float(changes[changes > 0].min()), float(np.median(steps))
     if np.any(np.abs(steps - step) > 0.5 * step):
         return 0.0
-    moving = np.gradient(position) != 0
-    for lag in _lags(np.diff(position)):
-        same = np.abs(position[lag:] - position[:-lag]) < 0.5 * count
+    moving = changes > 0
+    for lag in _lags(position):
+        same = np.abs(position[1 + lag :] - position[1:-lag]) < 0.5 * count
         if np.count_nonzero(same & moving[lag:]) > SAME * np.count_nonzero(moving[lag:]):
             return float(lag * step)
     return 0.0
 
 
-def _lags(signal: Float[np.ndarray, " N"]) -> list[int]:
-    """Lags, in samples, at which a signal differs least from itself, the shortest first."""
-    size, most = len(signal), len(signal) // 2
+def _lags(position: Float[np.ndarray, " N"]) -> list[int]:
+    """Lags, in samples, after which the steps differ least, the shortest first, once the position
+    has been elsewhere: of a slow one most samples are in the count of the one before.
+    """
+    most = len(position) // 2
     if most < 3:
         return []
-    centred = signal - signal.mean()
-    spectrum = np.fft.rfft(centred, 2 * size)
-    products = np.fft.irfft(np.abs(spectrum) ** 2)[: most + 1]
-    squares = np.pad(np.cumsum(centred**2), (1, 0))
-    lag = np.arange(most + 1)
-    apart = (squares[size - lag] + squares[-1] - squares[lag] - 2 * products) / (size - lag)
-    inner = apart[1:-1]
-    least = 1 + np.flatnonzero((inner <= apart[:-2]) & (inner <= apart[2:]))
+    apart = _apart(np.diff(position), most)
+    least = 1 + np.flatnonzero((apart[1:-1] <= apart[:-2]) & (apart[1:-1] <= apart[2:]))
+    away = _apart(position, most) >= np.var(position)
+    least = least[least > np.argmax(away)] if away.any() else least[:0]
     return sorted(least[np.argsort(apart[least])[:LAGS]].tolist())
+
+
+def _apart(signal: Float[np.ndarray, " N"], most: int) -> Float[np.ndarray, " L"]:
+    """The mean-square difference of a signal from itself, by lags up to `most`."""
+    size, lag = len(signal), np.arange(most)
+    centred = signal - signal.mean()
+    products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * size)) ** 2)[:most]
+    squares = np.pad(np.cumsum(centred**2), (1, 0))
+    return (squares[size - lag] + squares[-1] - squares[lag] - 2 * products) / (size - lag)
