@@ -59,6 +59,7 @@ def _apart(signal: Float[np.ndarray, " N"], most: int) -> Float[np.ndarray, " L"
     """The mean-square difference of a signal from itself, by lags up to `most`."""
     size, lag = len(signal), np.arange(most)
     centred = signal - signal.mean()
-    products = np.fft.irfft(np.abs(np.fft.rfft(centred, 2 * size)) ** 2)[:most]
+    longer = 1 << (2 * size - 1).bit_length()
+    products = np.fft.irfft(np.abs(np.fft.rfft(centred, longer)) ** 2)[:most]
     squares = np.pad(np.cumsum(centred**2), (1, 0))
     return (squares[size - lag] + squares[-1] - squares[lag] - 2 * products) / (size - lag)
