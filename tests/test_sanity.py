@@ -154,6 +154,20 @@ def test_a_soft_knee_is_no_hard_limit(motion):
     assert "force_limit" not in wrong(check_logs([Part(recording, None, Known(force[:, 1]))])[0])
 
 
+@pytest.mark.parametrize(("spread", "found"), [(0.002, True), (0.014, False)])
+def test_what_is_needed_beyond_a_limit_is_one_value(spread, found):
+    """A load that the simulator lacks asks for more as well, of a motion that needs any force."""
+    draw, count = np.random.default_rng(0), 3000
+    more = np.repeat(draw.integers(0, 4, count // 10), 10) == 0  # a quarter of the time
+    needed = np.where(
+        more, 0.083 + spread * draw.normal(size=count), draw.uniform(0.01, 0.07, count)
+    )
+    side = np.where(np.sin(np.arange(count) / 50) > 0, 1.0, -1.0)
+    asked = needed + np.where(more, 0.02 + draw.exponential(0.06, count), 0)
+    limit = limits.limit_of(side * asked, side * needed, side * draw.uniform(1, 2, count), "N")
+    assert (limit is not None) == found
+
+
 def test_friction_of_another_level_is_no_hard_limit(motion):
     """Where friction is nearly all of the force, what it is more by is like a command cut off."""
     time, position, force = motion

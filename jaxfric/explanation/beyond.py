@@ -77,7 +77,7 @@ def tone_beyond(samples: Samples, evidence: Evidence, seed: int = 0) -> Structur
     series[cell] = rest
     tones = np.fft.rfftfreq(len(series), step)
     power = np.abs(np.fft.rfft(series)) ** 2
-    best = standing_out(tones, power, line_frequencies(evidence, "time")[-1])
+    best = standing_out(tones, power, line_frequencies(evidence, "time")[-1], evidence.repeats)
     if best is None or not _alone(power, best):
         return None
     tone, block = float(tones[best]), evenly(len(rest), BLOCKS)

@@ -64,7 +64,7 @@ def coarse(term: AbstractTerm, betas: np.ndarray) -> np.ndarray:
 
 # Shapes that are scattered over a whole set, and no more than so many steps of them along a motion:
 # some seconds.
-SCATTERED, STEPS = 4096, 2e7
+SCATTERED, STEPS = 1024, 2e7
 
 
 class CandidateSet:

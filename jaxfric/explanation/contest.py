@@ -13,7 +13,7 @@ from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains, without_shapes
 from .scanning import scanned
-from .significance import DRAWS, LEVEL, NEW, BlockBootstrap, Scan, blocks, thresholds
+from .significance import DRAWS, LEVEL, NEW, BlockBootstrap, Scan, thresholds, witnesses
 from .spectral_lines import fast_tone
 from .threads import each
 
@@ -113,8 +113,7 @@ def contest(
     `refused`: forms of laws that may not win, and so keep no other from being looked at.
     """
     seen = evidence
-    block = blocks(seen.elapsed[seen.centre], seen.reach)
-    bootstrap = BlockBootstrap(current, block, seed)
+    bootstrap = BlockBootstrap(current, witnesses(seen), seed)
 
     candidates = field.candidates
     scans, p_values = scanned(bootstrap, field, seen)

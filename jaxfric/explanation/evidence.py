@@ -43,6 +43,7 @@ class Evidence(NamedTuple):
     - `located`: whether a position was recorded; else there is none, or the velocity's integral.
     - `counted`: the step of the recorded position, m; zero where it is not counted.
     - `noise`: standard deviation of the white noise of the force's samples, N.
+    - `repeats`: the time, s, after which the motion repeats itself to a count; zero for never.
     """
 
     motion: Recording
@@ -63,6 +64,7 @@ class Evidence(NamedTuple):
     located: bool
     counted: float
     noise: float
+    repeats: float
 
     @property
     def half(self) -> int:
@@ -256,6 +258,7 @@ def gather(
         located=located,
         counted=signals.count_of(np.asarray(prepared.position, float)[:MOST]) if located else 0.0,
         noise=signals.host_white_noise(first, linked),
+        repeats=motion.repeats,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from .candidates import scaled
 from .evidence import Evidence
 from .regression import Fit, fit
-from .significance import LEVEL, BlockBootstrap, Scan, adjusted, blocks
+from .significance import LEVEL, BlockBootstrap, Scan, adjusted, witnesses
 from .spectral_lines import OVERSAMPLING, SpectralLines, line_frequencies
 from .threads import each
 
@@ -47,8 +47,7 @@ def locate(evidence: Evidence, current: Fit, seed: int = 0, lines: bool = True) 
 
     `lines`: spectral lines too, and not curves alone.
     """
-    block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-    bootstrap = BlockBootstrap(current, block, seed)
+    bootstrap = BlockBootstrap(current, witnesses(evidence), seed)
 
     def over(coordinate) -> _Scanned:
         name, (value, factor, kind) = coordinate
@@ -125,8 +124,7 @@ def _recurs(peak: float, there: Fit, held: Evidence, seed: int) -> bool:
     """
     span = held.limits.high - held.limits.low
     near = np.abs(peak + np.array([-1.0, 0.0, 1.0]) / (OVERSAMPLING * span))
-    block = blocks(held.elapsed[held.centre], held.reach)
-    scan = BlockBootstrap(there, block, seed)(
+    scan = BlockBootstrap(there, witnesses(held), seed)(
         scaled(SpectralLines("position", False).columns(held, near))
     )
     (p_value,) = adjusted(np.array([scan.gain.max()]), scan.drawn[None])

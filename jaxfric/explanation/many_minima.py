@@ -21,7 +21,7 @@ from .regression import Fit, fast, fit, gains
 
 # So many about each of the best, so often; and so many points of the grid are refined. With five
 # parameters: on nine machines twice as many, or other ways to spread them, were no better on all.
-AROUND, BEST, ROUNDS, NEAR = 127, 4, 5, 2
+AROUND, BEST, ROUNDS, NEAR = 63, 4, 5, 2
 # How often it is then looked along the valley of the best one, and steps of each refinement: more
 # of either lowered the energy, but took seconds.
 ALONG, STEPS = 3, 5

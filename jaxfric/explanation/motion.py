@@ -10,6 +10,7 @@ from .. import signals
 from ..data.recording import Recording, pad
 from ..terms import KNOWN_MASKED
 from .evaluation import without_known
+from .repeats import repeated_after
 
 
 class Motion(NamedTuple):
@@ -17,12 +18,13 @@ class Motion(NamedTuple):
 
     `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
     few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
-    `signals.smoothing`.
+    `signals.smoothing`; `repeats`: the time, s, after which it repeats itself to a count, or zero.
     """
 
     recording: Recording
     padded: Recording
     smoothed: float
+    repeats: float = 0.0
 
     def forced(self, force: Any) -> "Motion":
         """The same motion with another force, N, `(N,)`."""
@@ -63,7 +65,7 @@ def derived(recording: Recording) -> Motion:
         choice = signals.choose(padded)
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
     padded = dataclasses.replace(padded, mask=whole.mask, channels=whole.channels)
-    return Motion(recording, padded, smoothed)
+    return Motion(recording, padded, smoothed, repeated_after(recording))
 
 
 def moves(recording: Recording) -> np.ndarray:

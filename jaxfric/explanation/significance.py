@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .evidence import Evidence
 from .regression import Fit
 
 # Few enough that a slow hidden load stays within a block on most records: shorter blocks take it
@@ -57,7 +58,10 @@ class Scan(NamedTuple):
 
 
 class BlockBootstrap:
-    """Residual and span of one fit, and the signs by which the residual's blocks are flipped."""
+    """Residual and span of one fit, and the signs by which the residual's blocks are flipped.
+
+    Of a block, by its number in `block`, `(J,)`, several pieces may lie apart.
+    """
 
     def __init__(self, fit: Fit, block: np.ndarray, seed: int = 0):
         basis = fit.basis()
@@ -66,9 +70,11 @@ class BlockBootstrap:
         self.scale = float(np.sqrt(residual @ residual))
         self.basis = basis.astype(np.float32)
         self.residual = (residual / self.scale).astype(np.float32)
-        count = int(block[-1]) + 1
-        ends = np.searchsorted(block, np.arange(count + 1)).tolist()
-        self.blocks = [slice(*pair) for pair in zip(ends[:-1], ends[1:], strict=True)]
+        starts = np.flatnonzero(np.diff(block, prepend=-1))
+        ends = [*starts[1:].tolist(), len(block)]
+        self.pieces = [slice(*pair) for pair in zip(starts.tolist(), ends, strict=True)]
+        owner, count = block[starts], int(block.max()) + 1
+        self.owned = (owner[:, None] == np.arange(count)).astype(np.float32)
         signs = np.random.default_rng(seed).integers(0, 2, (DRAWS, count)) * 2.0 - 1.0
         self.signs = signs.astype(np.float32)
 
@@ -130,9 +136,9 @@ class BlockBootstrap:
         """Scores E_bᵀ r_b, `(G, k, B)`, and leverages E_bᵀ E_b, `(G, B, k, k)`, of each block."""
         groups, k, size = own.shape
         flat = own.reshape(-1, size)
-        scores = np.empty((groups * k, len(self.blocks)), own.dtype)
-        lever = np.empty((groups, len(self.blocks), k, k), own.dtype)
-        for b, rows in enumerate(self.blocks):
+        scores = np.empty((groups * k, len(self.pieces)), own.dtype)
+        lever = np.empty((groups, len(self.pieces), k, k), own.dtype)
+        for b, rows in enumerate(self.pieces):
             scores[:, b] = flat[:, rows] @ residual[rows]
             part = own[..., rows]
             if k > 2:
@@ -141,6 +147,9 @@ class BlockBootstrap:
             for i in range(k):
                 for j in range(i + 1):
                     lever[:, b, i, j] = lever[:, b, j, i] = np.vecdot(part[:, i], part[:, j])
+        if len(self.pieces) > self.owned.shape[1]:
+            scores = scores @ self.owned
+            lever = np.einsum("gpij,pb->gbij", lever, self.owned, optimize=True)
         return scores.reshape(groups, k, -1), lever
 
     def _unexplained(self, lever, scores, fitted):
@@ -184,16 +193,34 @@ def blocks(elapsed: np.ndarray, reach: float) -> np.ndarray:
 
     **Arguments:** `elapsed`, s, of each row; `reach`, the kernel's half-width, s.
     """
-    spacing = 0.5 * reach
-    whole = len(elapsed) * spacing / (BLOCK_LENGTH * reach)
-    count = int(min(BLOCKS, max(whole, min(2 * whole, FEWEST))))
+    count = _enough(len(elapsed))
     if count < FEWEST:
-        needed = 0.5 * FEWEST * BLOCK_LENGTH * reach
+        spacing, needed = 0.5 * reach, 0.5 * FEWEST * BLOCK_LENGTH * reach
         raise ValueError(
             f"{len(elapsed) * spacing:.3g} s of slip are too short to tell structure from chance; "
             f"with this noise that takes {needed:.3g} s. Record longer, or more finely."
         )
     return evenly(len(elapsed), count)
+
+
+def witnesses(evidence: Evidence) -> np.ndarray:
+    """The block of each row, `(J,)`; those of several periods are one where the motion repeats.
+
+    As [`blocks`][] where the motion does not repeat to a count of the encoder, or after too short a
+    time for as many blocks as a test needs. Raises `ValueError` as that one does.
+    """
+    elapsed, period = evidence.elapsed[evidence.centre], evidence.repeats
+    block = blocks(elapsed, evidence.reach)
+    if not period:
+        return block
+    count = _enough(len(elapsed) * period / float(elapsed[-1] - elapsed[0]))
+    return block if count < FEWEST else (elapsed / period % 1 * count).astype(int) % count
+
+
+def _enough(rows: float) -> int:
+    """How many blocks so many rows, half a half-width of the kernel apart, make."""
+    whole = 0.5 * rows / BLOCK_LENGTH
+    return int(min(BLOCKS, max(whole, min(2 * whole, FEWEST))))
 
 
 def evenly(rows: int, count: int) -> np.ndarray:

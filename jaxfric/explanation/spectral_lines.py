@@ -120,6 +120,8 @@ ITSELF, FAVOUR = 0.5, 9.0
 # Resolution cells whose median is the noise about a line: thousands would take in the noise's own
 # colour, and of a few the line itself is too many.
 NEIGHBOURS = 64
+# Of the lines of a motion that repeats there are fewer.
+FEWER_NEIGHBOURS = 16
 # A record with more gaps than this, as a day between two runs, has a clock but no spectrum.
 SPARSE = 16
 _NONE = np.zeros(0)
@@ -177,7 +179,7 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     series = np.zeros(OVERSAMPLING * (int(cell[-1]) + 1))
     series[cell] = current.residual
     tones = np.fft.rfftfreq(len(series), 0.5 / top)
-    best = standing_out(tones, np.abs(np.fft.rfft(series)) ** 2, scanned)
+    best = standing_out(tones, np.abs(np.fft.rfft(series)) ** 2, scanned, evidence.repeats)
     if best is None:
         return _NONE
     tone = tones[best]
@@ -188,20 +190,41 @@ def fast_tone(evidence: Evidence, current: Fit) -> np.ndarray:
     return found + steps[(found + steps > top) == (found > top)]
 
 
-def standing_out(tones: np.ndarray, power: np.ndarray, above: float) -> int | None:
+def standing_out(
+    tones: np.ndarray, power: np.ndarray, above: float, repeats: float = 0.0
+) -> int | None:
     """The number of the ordinate that stands out most of its neighbours, of tones `above` one, Hz;
     `None` where none does by more than chance.
+
+    Where the motion `repeats` after a time, s, all that it drives has its lines at multiples of one
+    frequency, the answers to the roundings of the position too. So these are neighbours of each
+    other alone: a line among them has to stand out of the others.
     """
-    first, near = int(np.searchsorted(tones, above, "right")), OVERSAMPLING * NEIGHBOURS
-    power = power[first:]
+    number = np.arange(int(np.searchsorted(tones, above, "right")), len(tones))
+    kinds = [(number, OVERSAMPLING * NEIGHBOURS)]
+    if repeats:
+        multiple = np.round(tones[number] * repeats)
+        away = np.abs(tones[number] - multiple / repeats)
+        others = number[away > OVERSAMPLING * (tones[1] - tones[0])]
+        order = np.lexsort((away, multiple))
+        nearest = order[np.unique(multiple[order], return_index=True)[1]]
+        kinds = [(others, OVERSAMPLING * NEIGHBOURS), (number[nearest], FEWER_NEIGHBOURS)]
+    ratios = [_ratios(power[some], near) for some, near in kinds]
+    total, best, highest = sum(map(len, ratios)), None, 0.0
+    for (some, _), ratio in zip(kinds, ratios, strict=True):
+        if len(ratio) and ratio.max() > highest:
+            best, highest = int(some[np.argmax(ratio)]), float(ratio.max())
+    return best if np.exp(-highest) * total <= LEVEL else None
+
+
+def _ratios(power: np.ndarray, near: int) -> np.ndarray:
+    """Ordinates over the mean of the noise in each part of so many; none where there are fewer."""
     parts = len(power) // near
     if not parts:
-        return None
+        return np.zeros(0)
     part = np.minimum(np.arange(len(power)) // near, parts - 1)
     noise = np.median(power[: parts * near].reshape(parts, near), axis=1) / np.log(2)
-    ratio = power / np.maximum(noise[part], 1e-300)
-    best = int(np.argmax(ratio))
-    return None if np.exp(-ratio[best]) * len(ratio) > LEVEL else first + best
+    return power / np.maximum(noise[part], 1e-300)
 
 
 def _at_nodes(tone: float, evidence: Evidence) -> float:

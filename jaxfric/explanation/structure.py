@@ -11,7 +11,7 @@ from .acceptance import LATER_SHARE, LEAST_SHARE, LINEARITY, OF_BASE
 from .bins import unit
 from .evidence import Evidence
 from .finding import Finding
-from .improvement import Improved
+from .improvement import UNSEEN, Improved
 from .locate import ACCELERATED, Structure, locate, repeated, without_line
 from .mismatch import Mismatch
 from .predictions import with_predictions
@@ -102,6 +102,17 @@ def lasting(
     if problem.held is None:
         return found
     return repeated(found, current, with_predictions(problem.held, current), seed)
+
+
+def that_matter(found: list[Structure], current: Fit, left: float) -> list[Structure]:
+    """The structure of a fit's residual that is a reason for a verdict, though it has no name.
+
+    It is none where it is smaller than what differs from row to row, and the force error by samples
+    would be less by under a hundredth of itself without it: then what is left is no more than noise
+    makes. `left` of the force at the samples, N, root mean square.
+    """
+    noise, unseen = fast(current), left * float(np.sqrt(1 - (1 - UNSEEN) ** 2))
+    return [each for each in found if each.size > min(noise, unseen)]
 
 
 def documents(

@@ -72,14 +72,16 @@ def summarise(
     errors = document(better, filtered, models[1], figures, tone)
     apart = _elsewhere(errors, effects, better.findings)
     remarks = [*remarks, *apart]
-    tones = []
+    tones, samples = [], figures.samples(models[1])
     if tone is not None:
-        samples = figures.samples(models[1])
         remarks.append(beyond.remark(tone, samples))
         tones = [tone] if beyond.matters(tone, samples) else []
+    left = beyond.rms(samples.rest)
+    unnamed = structure.that_matter(before.counts, better.first, left)
+    there = before.counts if findings else unnamed
+    after = structure.that_matter(after, better.findings.undelayed.selection.last, left)
     new, later = (
-        [s for s in some if s.coordinate not in known.structured] + tones
-        for some in (before.counts, after)
+        [s for s in some if s.coordinate not in known.structured] + tones for some in (there, after)
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(better.findings, filtered)
@@ -90,7 +92,7 @@ def summarise(
     seen = better.seen if better.spoilt is not None and known.fit is None else ()
     absent = (*better.dropped, *(finding.effect for finding in refuted))
     verdict = verdict_of(findings, new, later, much, standing, remarks, seen)
-    there = sorted([*before.counts, *tones], key=lambda each: -each.share)
+    there = sorted([*there, *tones], key=lambda each: -each.share)
     where = structure.documents(there, findings, better.first, units, known.structured)
     if verdict == "unexplained" and not where:
         where = structure.strongest(before, units, known.structured)

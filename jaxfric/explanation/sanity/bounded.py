@@ -35,10 +35,6 @@ SUSPECT = 0.8
 # Of the mean-square mismatch beyond the level, what there may be below, a third in amplitude: what
 # arrives obeys the baseline. Cogging in a slow motion is as much below friction's level as above.
 BELOW = 0.1
-# What is needed beyond the level is one value: it spreads by less than a quarter of its distance
-# from what is needed below. At a stop, or with a friction that is most of the force, that is as
-# near.
-SPREAD = 0.25
 # A machine that is at its limit for most of the time does not do what it is told: the lower part of
 # the commands arrives, and the baseline is fitted to it first. Fitted to all of them it would err
 # by the excess, too, and could hide it. Where the axis mostly moves at constant speed, that part
@@ -156,10 +152,8 @@ def _one_level(size: np.ndarray, needed: np.ndarray, level: float) -> bool:
     """Whether commands below a level arrive, and what is needed beyond it is one value."""
     beyond = size > level
     apart = (size - needed) ** 2
-    if np.mean(apart[~beyond]) > BELOW * np.mean(apart[beyond]):
-        return False
-    away = needed[~beyond] - np.mean(needed[beyond])
-    return bool(np.std(needed[beyond]) < SPREAD * np.sqrt(np.mean(away**2)))
+    arrives = np.mean(apart[~beyond]) <= BELOW * np.mean(apart[beyond])
+    return bool(arrives and limits.one_value(needed, beyond))
 
 
 def _cut_off(motion: Motion, problem: Problem, level: float) -> Fit:

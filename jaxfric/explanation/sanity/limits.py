@@ -23,6 +23,10 @@ LEVELS = 200
 # Of what wrong values leave, what a clip has to: where friction is most of the force, a wrong level
 # of it, in one direction or both, is near a clip.
 HALVED = 0.5
+# What is needed beyond the level is one value: it spreads by less than a quarter of its distance
+# from what is needed below. At a stop, with a friction that is most of the force, or where a load
+# that the simulator lacks asks for the command, that is as near.
+SPREAD = 0.25
 
 
 def hard_limit(recording: Recording) -> Estimate | None:
@@ -67,6 +71,8 @@ def limit_of(
     inside = np.sum((level - needed[beyond]) ** 2)
     if not inside < LEAVES * np.sum(mismatch[beyond]):
         return None
+    if not one_value(needed, beyond):
+        return None
     if not left * mismatch.sum() < HALVED * _by_values(command, known, speed):
         return None
     excess = size[beyond] - np.mean(size[beyond])
@@ -76,6 +82,12 @@ def limit_of(
     visits = np.flatnonzero(np.diff(beyond.astype(int), prepend=0) == 1)
     error = float(np.std(needed[beyond])) / np.sqrt(max(len(visits), 1))
     return Estimate(np.float64(level), np.float64(error), unit)
+
+
+def one_value(needed: np.ndarray, beyond: np.ndarray) -> bool:
+    """Whether what the motion needed, N, is one value `beyond` a level, `(M,)` both."""
+    away = needed[~beyond] - np.mean(needed[beyond])
+    return bool(np.std(needed[beyond]) < SPREAD * np.sqrt(np.mean(away**2)))
 
 
 def _by_values(command: np.ndarray, known: np.ndarray, speed: np.ndarray) -> float:
