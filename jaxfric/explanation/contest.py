@@ -12,8 +12,8 @@ from .evidence import Evidence
 from .many_minima import BEYOND_CHANCE, among_many, noise, promise
 from .outstanding import outstanding
 from .regression import Fit, fit, gains, without_shapes
-from .scanning import scanned
-from .significance import DRAWS, LEVEL, NEW, BlockBootstrap, Scan, thresholds, witnesses
+from .scanning import between, scanned
+from .significance import DRAWS, LEVEL, MOSTLY, NEW, BlockBootstrap, Scan, thresholds, witnesses
 from .spectral_lines import fast_tone
 from .threads import each
 
@@ -138,7 +138,17 @@ def contest(
     beside = current.energy - bootstrap.scale**2
     most = [beside + REFINED * t.gain * bootstrap.scale**2 for t in eligible]
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
-    finalists = _finals(seen, current, field, eligible, size, within_reach, refused)
+
+    def retested(found: Finalist) -> float:
+        """The p-value of a load that is stepped, found beside its grid."""
+        candidate = found.trial.candidate
+        number = next(i for i, each in enumerate(candidates) if each is candidate)
+        [grid] = field.columns([candidate], seen)
+        own = scaled(seen.columns(candidate.term, found.betas[-1][None]))
+        columns = np.concatenate([grid, own])
+        return between(bootstrap, scans, number, columns, candidate.effect.positive)
+
+    finalists = _finals(seen, current, field, eligible, size, within_reach, refused, retested)
     return Contest(trials, finalists, size, unseen, current.energy)
 
 
@@ -189,6 +199,7 @@ def _finals(
     size: float,
     within_reach: bool,
     refused: frozenset[Hashable],
+    retested: Callable[[Finalist], float],
 ) -> list[Finalist]:
     bent = any(t.p_value <= LEVEL and t.candidate.term.coordinates <= _SPEED for t in trials)
     if not (bent or within_reach):
@@ -221,6 +232,8 @@ def _finals(
         trial, gain = found.trial, 1 - found.energy / current.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
+        if p_value > LEVEL and gain >= MOSTLY and trial.candidate.term.stepped:
+            p_value = retested(found)
         return found._replace(score=trial.score(gain, size), p_value=p_value)
 
     # What takes longest comes first, so that no thread waits for another at the end.

@@ -51,6 +51,22 @@ def scanned(
     return scans, _p_values(scans)
 
 
+def between(
+    bootstrap: BlockBootstrap, scans: list[Scan], number: int, columns: np.ndarray, positive: bool
+) -> float:
+    """The p-value of what was found between the points of the grid of candidate `number`, which is
+    as good as a point of it, among all candidates.
+
+    Of a law with many minima the grid may miss all: what its best point leaves is no noise, and its
+    flipped signs are fitted as well as it. Beside what was found only noise is left to be flipped.
+
+    **Arguments:** `columns`: those of the grid and of what was found, `(G, k, J)`.
+    """
+    every = [*scans]
+    every[number] = bootstrap(columns, positive)
+    return float(_p_values(every)[number])
+
+
 def _p_values(scans: list[Scan]) -> np.ndarray:
     """p-values of the best group of each scan, corrected for all of them, `(C,)`."""
     return adjusted(np.array([s.gain[s.best] for s in scans]), np.array([s.drawn for s in scans]))
