@@ -38,6 +38,7 @@ from jaxfric.explanation import (
     physical_constraints,
     predictions,
     problem,
+    refining,
     regression,
     reported,
     sanity,
@@ -48,6 +49,7 @@ from jaxfric.explanation import (
     stepwise,
     structure,
     timing,
+    trials,
     uncertainty,
     verdict,
     verification,
@@ -171,10 +173,10 @@ def test_nothing_is_missing_where_nothing_is(healthy):
 def test_no_size_is_promised_of_an_effect_one_of_whose_laws_the_motion_does_not_show():
     """Friction that grows with the motor's force is a gain where the axis never brakes."""
     names = "load_dependent_friction", "spring"
-    trials = [types.SimpleNamespace(threshold=0.1, new_part=1.0, effect=EFFECTS[n]) for n in names]
+    tried = [types.SimpleNamespace(threshold=0.1, new_part=1.0, effect=EFFECTS[n]) for n in names]
     left = types.SimpleNamespace(energy=4.0, residual=np.ones(4))
     for unseen in (frozenset(), frozenset(names[:1])):
-        found = verification.smallest_visible(contest.Contest(trials, [], 1.0, unseen), left)
+        found = verification.smallest_visible(trials.Contest(tried, [], 1.0, unseen), left)
         assert set(found) == set(names) - unseen
 
 
@@ -452,13 +454,13 @@ def test_a_delay_too_long_for_its_first_order_is_undone(healthy):
 
     def overlooked(run):
         posed = problem.problem_of(run, gaussian)
-        nothing = selection.Selection(posed.base, posed.base, [], contest.Contest([], [], 200.0))
+        nothing = selection.Selection(posed.base, posed.base, [], trials.Contest([], [], 200.0))
         return timing.overlooked(run, posed, nothing)
 
     run = dataclasses.replace(healthy[0], force=jnp.roll(healthy[0].force, -30))
     lateness = overlooked(jax.tree.map(lambda x: x[:-32], run))
     assert lateness.selected.trial.candidate.effect.name == "transport_delay"
-    assert lateness.selected.rivals == () and lateness.selected.p_value <= contest.LEVEL
+    assert lateness.selected.rivals == () and lateness.selected.p_value <= significance.LEVEL
     assert lateness.time == pytest.approx(30e-3, abs=1.1e-3)  # within a sample, as above
     assert overlooked(healthy[0]) is None
     term, alpha, beta = CASES["cogging"]
@@ -487,7 +489,7 @@ def test_several_lags_in_a_row_may_be_a_delay_or_a_lag(healthy, stages, said):
     force = np.fft.ifft(shares * lag).real + np.random.default_rng(0).normal(0, 0.2, len(TIME))
     run = jax.tree.map(lambda a: a[500:-500], Recording(TIME, force, x))
     posed = problem.problem_of(run, models.named("gaussian"))
-    nothing = selection.Selection(posed.base, posed.base, [], contest.Contest([], [], 500.0))
+    nothing = selection.Selection(posed.base, posed.base, [], trials.Contest([], [], 500.0))
     found = timing.overlooked(motion_of(run), posed, nothing)
     assert sorted([found.selected.effect.name, *found.selected.rivals]) == said
     assert found.time == pytest.approx(0.012, rel=0.2)
@@ -942,10 +944,10 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
         every = [each for some in posed.candidate_set.groups for each in some]
         step = next(each for each in every if isinstance(each.term, terms.PayloadChange))
         grid, basis = step.betas[:, 0], posed.base.basis()
-        trial = contest.Trial(step, step.betas[0], 0.1, 0.01, 1, 0.002, 0.01, 1.0)
+        trial = trials.Trial(step, step.betas[0], 0.1, 0.01, 1, 0.002, 0.01, 1.0)
         below, above = np.searchsorted(grid, moment) + [-1, 0]
         found = [
-            contest._refined(
+            refining.refined(
                 seen, posed.base, posed.candidate_set, trial._replace(beta=step.betas[i]), basis
             )
             for i in (below, above)
@@ -955,7 +957,7 @@ def test_a_moment_is_refined_from_the_best_of_a_finer_grid(healthy):
         least = target @ target - regression.gains(step.term, seen, every, basis).max()
         assert all(each.energy < 1.02 * least for each in found)
     waves = [c for some in posed.candidate_set.groups for c in some if c.lines is not None]
-    assert all(not len(contest._between(trial._replace(candidate=c))) for c in waves)
+    assert all(not len(refining._between(trial._replace(candidate=c))) for c in waves)
 
 
 @pytest.mark.slow
@@ -1186,7 +1188,7 @@ def test_a_change_has_rows_before_and_after(healthy):
             trial=types.SimpleNamespace(candidate=types.SimpleNamespace(term=term)),
             betas=(np.zeros(0), np.array([moment])),
         )
-        assert contest._changed(found, posed.evidence) == changes
+        assert refining.changes(found, posed.evidence) == changes
 
 
 def test_a_sentence_gives_no_number_that_the_recording_cannot_tell():
@@ -1308,8 +1310,8 @@ def test_a_load_behind_a_gap_has_no_more_than_all_the_inertia(healthy):
         seen = posed.evidence._replace(target=posed.evidence.target + force)
         now = regression.fit([posed.structure], seen, posed.base.betas[:1], 0)
         alpha, betas = np.array([friction]), (*now.betas, beta)
-        found = contest.Finalist(80.0, trial, 0.002, 0.2 * now.energy, betas, alpha)
-        round_ = physical_constraints.constrained(contest.Contest([], [found], 100.0), now, seen)
+        found = trials.Finalist(80.0, trial, 0.002, 0.2 * now.energy, betas, alpha)
+        round_ = physical_constraints.constrained(trials.Contest([], [found], 100.0), now, seen)
         if kept is None:
             assert not round_.finalists
             continue
@@ -1540,7 +1542,7 @@ def test_a_wave_finer_than_what_is_scanned_is_found_by_its_harmonics(healthy):
     best = contest.contest(seen, posed.base, posed.candidate_set).finalists[0]
     assert best.trial.candidate.effect.name == "cogging"
     assert best.trial.candidate.term.harmonics == 1
-    assert best.p_value <= contest.LEVEL
+    assert best.p_value <= significance.LEVEL
     np.testing.assert_allclose(best.betas[-1], pitch, rtol=0.005)
 
 
@@ -1647,7 +1649,7 @@ def test_one_effect_stands_for_several_wrong_values_where_it_says_as_much(health
         other = PARAMETERS | {"viscous+": 80.0, "viscous-": 80.0, "inertia": 5.1}
         known = models.from_parameters(models.gaussian(), other)
     posed = problem.problem_of(run, known.term)
-    none = selection.Selection(posed.base, posed.base, [], contest.Contest([], [], 1.0))
+    none = selection.Selection(posed.base, posed.base, [], trials.Contest([], [], 1.0))
     found = findings.alone(findings.Solution(posed, none))
     wrong = mismatch.mismatch(known, posed.base, posed.evidence, posed.wide)
     assert len(wrong.moved) > 1
@@ -1792,15 +1794,15 @@ def test_a_law_of_several_parameters_is_refined_from_all_optima_of_its_grid():
     gain = np.full((5, 4), 0.1)  # too little to be looked at
     gain[0, 0], gain[0, 1], gain[1, 1] = 0.9, 0.85, 0.8
     gain[3, 2], gain[3, 3], gain[4, 2] = 0.7, 0.6, 0.65
-    np.testing.assert_allclose(contest._optima(betas, gain.ravel()), [(8.0, 1000.0)])
-    assert contest._optima(betas[:, :1], gain.ravel()) == ()  # resolved: one optimum
-    assert contest._optima(betas, np.zeros(20)) == ()
+    np.testing.assert_allclose(trials._optima(betas, gain.ravel()), [(8.0, 1000.0)])
+    assert trials._optima(betas[:, :1], gain.ravel()) == ()  # resolved: one optimum
+    assert trials._optima(betas, np.zeros(20)) == ()
 
 
 def test_the_moments_of_pushes_have_their_price():
     def trial(term, beta):
         candidate = candidates.Candidate(EFFECTS["cogging"], term, np.zeros((1, len(beta))))
-        return contest.Trial(candidate, np.asarray(beta), 0.5, 0.0, 3, 0.002, 0.1, 1.0)
+        return trials.Trial(candidate, np.asarray(beta), 0.5, 0.0, 3, 0.002, 0.1, 1.0)
 
     size, price = 1000.0, 0.5 * np.log(1000.0)
     pushes = trial(terms.DisturbancePulses((1.0, 2.0, 3.0), 0.1), []).score(0.5, size)

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..terms.effect import Effect
-from .contest import Contest, Finalist, Trial
 from .evidence import Evidence
 from .predictions import with_predictions
 from .problem import BETWEEN, LEAST_SHARE, LINEARITY, WideKernels
 from .regression import Fit, fast, fit
 from .selection import SelectedTerm
 from .significance import DRAWS, LEVEL
+from .trials import Contest, Finalist, Trial
 
 # The same of a later term as `LEAST_SHARE` is of the first.
 LATER_SHARE = 0.05

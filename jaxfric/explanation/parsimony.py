@@ -9,7 +9,7 @@ from ..terms.effects.parameter_mismatch import MISMATCH
 from .acceptance import LINEARITY, accepted
 from .baseline import as_given
 from .common_factor import put_right
-from .contest import RIVAL, Contest, Finalist, contest
+from .contest import contest
 from .evidence import Evidence
 from .findings import Findings, Solution, alone
 from .mismatch import Mismatch
@@ -20,6 +20,7 @@ from .rivals import simplest, with_rivals
 from .selection import SelectedTerm
 from .significance import LEVEL
 from .stepwise import joined, with_own_term
+from .trials import RIVAL, Contest, Finalist
 
 
 class _Beside(NamedTuple):

@@ -11,11 +11,11 @@ from ..terms.sample import Burden
 from . import parameters as spelled
 from .acceptance import OF_BASE
 from .burdens import IDEALISED, Machine, machine
-from .contest import Contest, Finalist
 from .evidence import Evidence
 from .predictions import with_predictions
 from .regression import Fit, at_shapes, fit
 from .significance import blocks, evenly
+from .trials import Contest, Finalist
 
 # Where the rows determine an inertia badly and prefer somewhat more than the machine has, a load
 # with all of it is tried; a hundredth less, not to be refused by rounding.

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .contest import RIVAL, Contest, Finalist
 from .regression import Fit
 from .significance import LEVEL
+from .trials import RIVAL, Contest, Finalist
 
 # No idealisation of a reversal, or of what makes a force late, is right to the last tenth of its
 # score. A law of three nonlinear parameters finds that tenth in any of them: then the law with

@@ -10,7 +10,6 @@ from ..terms.effects import EFFECTS, traits
 from . import verification
 from .acceptance import HALF
 from .baseline import as_given
-from .contest import RIVAL, Contest
 from .findings import Findings, Solution, alone
 from .motion import Motion
 from .predictions import with_predictions
@@ -19,6 +18,7 @@ from .regression import fit
 from .selection import SelectedTerm, Selection
 from .stepwise import select
 from .timing import MOST_LATE, LateForce, late, overlooked, with_late_force
+from .trials import RIVAL, Contest
 
 # Forms of laws that do not compete.
 Refused = frozenset[Hashable]

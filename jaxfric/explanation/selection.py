@@ -8,9 +8,9 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..models import Model
 from ..terms.effect import Effect
-from .contest import Contest, Trial
 from .motion import Motion
 from .regression import Fit
+from .trials import Contest, Trial
 
 
 class SelectedTerm(NamedTuple):

@@ -8,16 +8,18 @@ from typing import NamedTuple
 from ..terms.base import AbstractTerm
 from ..terms.effect import Effect
 from .acceptance import LEAST_SHARE, accepted, needed
-from .contest import RIVAL, Contest, Finalist, Trial, contest, imitated
+from .contest import contest
 from .evidence import Evidence
 from .intervals import left_out, left_out_again
 from .physical_constraints import constrained, nil, told_parts
 from .predictions import with_predictions
 from .problem import Problem
+from .refining import imitated
 from .regression import Fit, fit, without, without_shapes
 from .rivals import simplest, with_rivals
 from .selection import SelectedTerm, Selection
 from .significance import blocks
+from .trials import RIVAL, Contest, Finalist, Trial
 
 # More terms than this are no explanation.
 MOST_TERMS = 4

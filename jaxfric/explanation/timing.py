@@ -18,7 +18,6 @@ from ..terms.effect import Effect
 from ..terms.effects import EFFECTS, traits
 from .acceptance import least_gain
 from .candidates import Candidate
-from .contest import RIVAL, Trial
 from .evidence import gather
 from .findings import Findings, Solution
 from .motion import Motion, motion_of
@@ -28,6 +27,7 @@ from .regression import Fit, fast, fit, without
 from .rivals import NO_EVIDENCE
 from .selection import SelectedTerm, Selection
 from .significance import BLOCKS, LEVEL, agreement
+from .trials import RIVAL, Trial
 
 # Steps, from the first-order estimate, which may be off by its own second order, to times between
 # which the least energy lies; and parabolas from there on, until the time is this well known.

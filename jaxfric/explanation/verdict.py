@@ -8,9 +8,9 @@ import numpy as np
 from ..checks import LEFT, Remark
 from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY, OF_BASE
-from .contest import Contest
 from .finding import Finding
 from .significance import LEVEL
+from .trials import Contest
 from .wording import LARGE
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast

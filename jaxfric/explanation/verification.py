@@ -5,12 +5,12 @@ import numpy as np
 from ..terms.base import AbstractTerm
 from ..terms.effects import traits
 from .baseline import as_given
-from .contest import Contest
 from .evidence import Evidence
 from .predictions import with_predictions
 from .problem import LEAST_SHARE
 from .regression import Fit, fast, without
 from .selection import Selection
+from .trials import Contest
 
 
 def residual(
