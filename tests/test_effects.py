@@ -71,6 +71,7 @@ CASES = {
     "backlash": (T.Backlash(0.003), (3.0,)),
     "elastic_backlash": (T.ElasticBacklash(0.003, 0.001, 2.0), (3.0,)),
     "damped_backlash": (T.DampedBacklash(0.003, 0.001, 2.0, 0.4, 0.3), (3.0,)),
+    "oiled_backlash": (T.OiledBacklash(0.003, 0.001, 2.0, 0.4, 0.3, 0.6), (3.0,)),
     "compliance_dry": (T.DryCompliance(4.0, 0.2, 0.5, -0.3), (2.0,)),
     "compliance": (T.Compliance(2.0, 0.1), (3.0,)),
     "compliance_friction": (T.Compliance(2.0, 0.1, "friction"), (1.5,)),
@@ -567,7 +568,7 @@ def test_a_load_comes_back_off_a_flank_as_its_damping_says(damping):
     place = np.concatenate([[0.0], np.cumsum(speed[1:]) * 1e-5])
     run = Recording(time, 0 * time, place, speed)
     slow = 0.5
-    term = T.DampedBacklash(2e-4, 1e-6, slow, 1e3, 0.0, damping)
+    term = T.OiledBacklash(2e-4, 1e-6, slow, 1e3, 0.0, damping)
     ahead = np.asarray(term.columns_and_momentum(run)[1])[:, 0] * slow  # of the load, m/s
     root = np.sqrt(1 - damping**2)
     turn = np.arctan2(2 * damping * root, 2 * damping**2 - 1)

@@ -45,8 +45,9 @@ def gap(force=8.0, half_gap=1e-3):
 
 
 def elastic(half_gap=1e-3, windup=2e-4, load_deceleration=4.0, **damped):
+    law = terms.DampedBacklash if damped else terms.ElasticBacklash
     return axis(
-        terms.DampedBacklash() if damped else terms.ElasticBacklash(), backlash_force=8.0,
+        terms.OiledBacklash() if "flank_damping" in damped else law(), backlash_force=8.0,
         half_gap=half_gap, windup=windup, load_deceleration=load_deceleration, **damped,
     )  # fmt: skip
 

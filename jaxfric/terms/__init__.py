@@ -19,6 +19,7 @@ from .effects.backlash import (
     Backlash as Backlash,
     DampedBacklash as DampedBacklash,
     ElasticBacklash as ElasticBacklash,
+    OiledBacklash as OiledBacklash,
 )
 from .effects.cogging import Cogging as Cogging, ForceRipple as ForceRipple
 from .effects.compliance import Compliance as Compliance, DryCompliance as DryCompliance

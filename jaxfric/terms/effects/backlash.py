@@ -206,31 +206,26 @@ class DampedBacklash(ElasticBacklash):
     `viscous_speed` v_s, m/s: there it is as large as the dry friction F_L. So a load that flies
     through the gap is slowed by (1 ± α + w/v_s) d. `load_asymmetry` α: which part of the mean of
     its dry friction is more forwards and less backwards, as it also seems to be where the load has
-    a weight. When it leaves a flank, and strikes the other one, depends on it. `flank_damping`: the
-    damping ratio of the load on its flank, below one: steel is hard, a film of oil is not.
+    a weight. When it leaves a flank, and strikes the other one, depends on it.
     """
 
     viscous_speed: Float[Array, ""] | float = UNKNOWN
     load_asymmetry: Float[Array, ""] | float = 0.0
-    flank_damping: Float[Array, ""] | float = _STEEL
-    nonlinear: ClassVar = (
+    nonlinear: ClassVar[tuple[Parameter, ...]] = (
         *ElasticBacklash.nonlinear,
         Parameter("viscous_speed", VELOCITY, _speed_bounds, resolution=Resolution(0, 0.5, None, 4)),
         ASYMMETRY,
-        FLANK_DAMPING,
     )
 
     def burden(self, beta, alpha) -> Burden:
-        burden = super().burden(beta[:3], alpha)
-        return burden._replace(lighter=lambda factor: beta * np.array([1, 1, factor, 1, 1, 1]))
+        def lighter(factor: float) -> np.ndarray:
+            return np.where([p == DECELERATION for p in self.nonlinear], factor, 1.0) * beta
+
+        return super().burden(beta[:3], alpha)._replace(lighter=lighter)
 
     @property
     def load(self) -> DryLoad:
         return super().load._replace(asymmetry=self.load_asymmetry)
-
-    @property
-    def damping(self):
-        return self.flank_damping
 
     @property
     def relief(self):
@@ -244,6 +239,20 @@ class DampedBacklash(ElasticBacklash):
         return self.load_deceleration / self.viscous_speed
 
 
+class OiledBacklash(DampedBacklash):
+    """[`DampedBacklash`][] with flanks that give back less of a blow than bare steel does.
+
+    `flank_damping`: the damping ratio of the load on its flank, below one.
+    """
+
+    flank_damping: Float[Array, ""] | float = UNKNOWN
+    nonlinear: ClassVar = (*DampedBacklash.nonlinear, FLANK_DAMPING)
+
+    @property
+    def damping(self):
+        return self.flank_damping
+
+
 def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     """Gaps and windups from what is crossed in a twentieth of the kernel's reach to the widest."""
     if not isinstance(term, ElasticBacklash):
@@ -255,7 +264,8 @@ def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     # is mostly as large as its dry one, or of no account.
     widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
     speeds = view.limits.fastest * np.array([1.0, 5.0])
-    return product([widths, windups, coasting(view), speeds, uneven(view), np.array([_HALF])])
+    flanks = [np.array([_HALF])] if isinstance(term, OiledBacklash) else []
+    return product([widths, windups, coasting(view), speeds, uneven(view), *flanks])
 
 
 def _ends(term: AbstractTerm, view: View) -> np.ndarray:
@@ -273,7 +283,8 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     """
     if not isinstance(term, ElasticBacklash):
         return np.zeros((0, len(term.nonlinear)))
-    place, (low, high) = scattered(count, 5), _ends(term, view)
+    oiled = isinstance(term, OiledBacklash)
+    place, (low, high) = scattered(count, 4 + oiled), _ends(term, view)
     least = np.clip(0.25 * view.acceleration * (view.reach / 20) ** 2, low[0], 0.1 * high[0])
     stroke = view.limits.high - view.limits.low
     widest = np.maximum(stroke / 30, 2 * least)
@@ -283,8 +294,9 @@ def flights(term: AbstractTerm, view: View, count: int) -> np.ndarray:
     ratio = 0.05 * 30.0 ** place[:, 3]  # viscous friction by dry friction there
     speed = 0.5 * view.limits.fastest / ratio
     none = np.zeros(len(place))  # about the best of them it is looked for
-    damping = low[5] + (high[5] - low[5]) * place[:, 4]
-    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, none, damping], axis=1)
+    found = np.stack([half_gap, windup, slowed / (1 + ratio), speed, none], axis=1)
+    if oiled:
+        found = np.append(found, low[5:] + (high - low)[5:] * place[:, 4:], axis=1)
     return np.clip(found, low, high)
 
 
@@ -299,7 +311,7 @@ BACKLASH = Effect(
     "reversals",
     "After a reversal {backlash_force} of friction is absent while a gap of {gap} is crossed: "
     "backlash",
-    laws=(Backlash, DampedBacklash),
+    laws=(Backlash, DampedBacklash, OiledBacklash),
     coordinates=("distance_since_reversal",),
     needs=frozenset({"position"}),
     confusable_with=("presliding", "compliance", "transport_delay"),
