@@ -76,12 +76,9 @@ def summarise(
     if tone is not None:
         remarks.append(beyond.remark(tone, samples))
         tones = [tone] if beyond.matters(tone, samples) else []
-    left = beyond.rms(samples.rest)
-    unnamed = structure.that_matter(before.counts, better.first, left)
-    there = before.counts if findings else unnamed
-    after = structure.that_matter(after, better.findings.undelayed.selection.last, left)
+    there, later = _that_matter(before.counts, after, better, bool(findings), samples)
     new, later = (
-        [s for s in some if s.coordinate not in known.structured] + tones for some in (there, after)
+        [s for s in some if s.coordinate not in known.structured] + tones for some in (there, later)
     )
     missing = rough(filtered, _by_effect(effects)) or beside_rows(errors) or halved(refuted)
     missing |= not findings and _halvable(better.findings, filtered)
@@ -96,15 +93,12 @@ def summarise(
     where = structure.documents(there, findings, better.first, units, known.structured)
     if verdict == "unexplained" and not where:
         where = structure.strongest(before, units, known.structured)
-    # What accounts for so much, or for what nothing else does, is told whatever its size.
-    kept = verdict == "unexplained" or halved(refuted)
-    listed = refuted if kept else with_size(refuted)
     shown = curves(before.counts[:6], better, models)
     return Explanation(
         verdict=verdict,
         where=where,
         findings=findings,
-        not_confirmed=listed,
+        not_confirmed=_listed(refuted, verdict),
         fit=errors,
         not_visible=_not_visible(selection, units, absent),
         model=models[1],
@@ -116,6 +110,30 @@ def summarise(
         warnings=[remark.to_dict() for remark in remarks],
         holdout_model=None if problem.held is None else holdout_model(better.findings),
     )
+
+
+def _that_matter(
+    before: list[Structure],
+    after: list[Structure],
+    better: Improved,
+    named: bool,
+    samples: beyond.Samples,
+) -> tuple[list[Structure], list[Structure]]:
+    """What is a reason for a verdict of the structure that the baseline and the findings leave;
+    beside findings, where anything is `named`, all of the baseline's.
+    """
+    left = beyond.rms(samples.rest)
+    last = better.findings.undelayed.selection.last
+    there = before if named else structure.that_matter(before, better.first, left)
+    return there, structure.that_matter(after, last, left)
+
+
+def _listed(refuted: Sequence[Finding], verdict: str) -> Sequence[Finding]:
+    """What is told as not confirmed: of what accounts for little, beside what does, only what this
+    recording knows a size of.
+    """
+    kept = verdict == "unexplained" or halved(refuted)
+    return refuted if kept else with_size(refuted)
 
 
 def tone_left(findings: Findings, figures: Figures) -> Structure | None:
