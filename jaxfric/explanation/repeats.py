@@ -13,6 +13,9 @@ from ..data.recording import Recording
 
 # The motion repeats where most samples that move are in the same count again.
 SAME = 0.5
+# Of a counted position steps of one count are a tenth of all, about the reversals; of one that is
+# not, the smallest of thousands is far below.
+ONE, SLOW = 0.5, 0.1
 # Lags at which the steps of the position are most like themselves that are looked at: sums of a few
 # sines are nearly the same again after many times.
 LAGS = 32
@@ -21,8 +24,9 @@ LAGS = 32
 def repeated_after(recording: Recording) -> float:
     """The shortest time, s, after which most samples that move are in the same count again.
 
-    Zero where there is none in half of the record, and where the samples, `(N,)`, are not equally
-    spaced. A count is the smallest change: decimals of a log make no two of them quite alike.
+    Zero where there is none in half of the record, where the samples, `(N,)`, are not equally
+    spaced, and where the position is not counted. A count is the smallest change: decimals of a log
+    make no two of them quite alike.
     """
     if recording.position is None or not np.asarray(recording.mask)[:MOST].all():
         return 0.0
@@ -31,6 +35,8 @@ def repeated_after(recording: Recording) -> float:
     if not changes.any():
         return 0.0
     count, step = float(changes[changes > 0].min()), float(np.median(steps))
+    if count < ONE * np.quantile(changes[changes > 0], SLOW):
+        return 0.0
     if np.any(np.abs(steps - step) > 0.5 * step):
         return 0.0
     moving = changes > 0

@@ -101,8 +101,6 @@ def select(
         trial = with_own_term(best.trial, current)
         selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
         current, evidence, selected = _pruned(evidence, current, selected, round_.contest.size)
-        if best.trial.candidate.form not in {each.form for each in selected}:
-            nothing.add(best.trial.candidate.form)  # idle at once: the next best is looked at
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)
             current, evidence, selected = _less(evidence, current, selected, number)

@@ -119,13 +119,17 @@ def _that_matter(
     named: bool,
     samples: beyond.Samples,
 ) -> tuple[list[Structure], list[Structure]]:
-    """What is a reason for a verdict of the structure that the baseline and the findings leave;
-    beside findings, where anything is `named`, all of the baseline's.
+    """What is a reason for a verdict of the structure that the baseline and the findings leave.
+
+    Beside findings, where anything is `named`, all of it: what they leave is theirs to explain.
     """
-    left = beyond.rms(samples.rest)
-    last = better.findings.undelayed.selection.last
-    there = before if named else structure.that_matter(before, better.first, left)
-    return there, structure.that_matter(after, last, left)
+    if named:
+        return before, after
+    left, last = beyond.rms(samples.rest), better.findings.undelayed.selection.last
+    return (
+        structure.that_matter(before, better.first, left),
+        structure.that_matter(after, last, left),
+    )
 
 
 def _listed(refuted: Sequence[Finding], verdict: str) -> Sequence[Finding]:
