@@ -23,9 +23,8 @@ def test_a_load_with_more_friction_one_way_strikes_when_it_does():
     gap = found.findings[0]
     assert gap.confirmed and gap.share > 0.95
     # By 12 % in dry friction and 25 % in viscous friction, of which the law knows one for both.
-    sides = (
-        (machine.physics[f"{name}+"], machine.physics[f"{name}-"]) for name in ("coulomb", "viscous")
-    )
+    own, names = machine.physics, ("coulomb", "viscous")
+    sides = ((own[f"{name}+"], own[f"{name}-"]) for name in names)
     dry, viscous = ((ahead - back) / (ahead + back) for ahead, back in sides)
     assert viscous < float(gap.parameters["load_asymmetry"].value) < dry
     low, high = gap.parameters["half_gap"].interval()

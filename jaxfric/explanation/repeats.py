@@ -13,9 +13,9 @@ from ..data.recording import Recording
 
 # The motion repeats where most samples that move are in the same count again.
 SAME = 0.5
-# Of a counted position steps of one count are a tenth of all, about the reversals; of one that is
-# not, the smallest of thousands is far below.
-ONE, SLOW = 0.5, 0.1
+# Of a counted position steps of one count are a hundredth of all at least, about the reversals; of
+# one that is not, the smallest of thousands is far below.
+ONE, SLOW = 0.5, 0.01
 # Lags at which the steps of the position are most like themselves that are looked at: sums of a few
 # sines are nearly the same again after many times.
 LAGS = 32
