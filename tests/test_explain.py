@@ -42,6 +42,7 @@ from jaxfric.explanation import (
     regression,
     reported,
     sanity,
+    scanning,
     search,
     selection,
     significance,
@@ -629,6 +630,24 @@ def test_a_signal_that_explains_all_of_one_block_is_believed(share, believed):
     scan = bootstrap(moves[None, None].astype(np.float32))
     gain, hurdle = gain_and_hurdle(scan)
     assert gain > significance.MOSTLY and (hurdle < 0.1) == believed
+
+
+@pytest.mark.parametrize(("found", "believed"), [(0.99, True), (0.45, False)])
+def test_what_is_found_between_points_of_a_grid_is_tested_as_a_point(found, believed):
+    """Two blows that the grid's shapes follow in part: of either sign, as flips of them have."""
+    draw, block = np.random.default_rng(0), significance.evenly(650, 24)
+    blow, other = (np.where(np.isin(block, [3, 15]), draw.normal(size=650), 0.0) for _ in range(2))
+    residual = blow + 0.05 * draw.normal(size=650)
+    sides = [1.0, np.where(block == 15, -1.0, 1.0)]
+    grid = candidates.scaled(np.stack([(0.8 * blow + other) * side for side in sides])[:, :, None])
+    basis = np.linalg.qr(np.ones((650, 1)))[0]
+    fit = types.SimpleNamespace(basis=lambda: basis, residual=residual)
+    bootstrap = significance.BlockBootstrap(fit, block)
+    scans = [bootstrap(grid)]
+    assert scanning._p_values(scans)[0] > 0.2
+    own = found**0.5 * blow + (1 - found) ** 0.5 * other
+    columns = np.concatenate([grid, candidates.scaled(own[None, :, None])])
+    assert (scanning.between(bootstrap, scans, 0, columns, True) <= significance.LEVEL) == believed
 
 
 @pytest.mark.slow

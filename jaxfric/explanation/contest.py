@@ -127,13 +127,13 @@ def _finals(
     # What takes longest comes first, so that no thread waits for another at the end.
     ordered = sorted(enumerate(trials), key=lambda pair: not pair[1].candidate.term.stepped)
     done = [found for found in each(final, ordered) if found is not None]
-    # The grid may show none of the minima of a law of many.
     least = min((found.energy for found in done), default=current.energy)
     if (1 - BEYOND_CHANCE) * least > noise(current):
         tried = {id(found.trial) for found in done}
-        left = [t for t in trials if t.effect.scatter and t.candidate.term.stepped]
-        for trial in [each for each in left if id(each) not in tried]:
-            # Half of what the best of the others removes, as of these.
+        left = (t for t in trials if t.effect.scatter and t.candidate.term.stepped)
+        for trial in (t for t in left if id(t) not in tried):
+            # The grid may show none of the minima of such a law. It has to promise half of what the
+            # best of the others removes, as these had to.
             most = promise(trial.candidate, seen, current, field, basis)
             if most < 0.5 * (current.energy - least):
                 continue

@@ -100,8 +100,8 @@ def _not_confirmed(findings: Sequence[Finding], recurs: bool) -> str:
     names = dict.fromkeys(finding.effect.replace("_", " ") for finding in findings)
     if recurs:
         return (
-            f"The held-out recording shows {' and '.join(names)} too, but the model with the "
-            "values from here is worse, and does without."
+            f"The held-out recording shows {' and '.join(names)} too, but with the values from "
+            "here the model is worse, so that it is left out."
         )
     return (
         f"What looks like {' and '.join(names)} here does not make the model better on the "

@@ -109,15 +109,16 @@ def _windup_bounds(scales):
 
 
 def _flank_bounds(scales):
-    """From bare steel, off which a load comes back with three quarters of its speed, to a film of
+    """From hard steel, off which a load comes back with three quarters of its speed, to a film of
     oil that leaves it a seventh.
     """
     return 0.1, 0.95
 
 
-_STEEL = 0.2
+# Of flanks that a law does not look for: a load comes back with 0.57 of its speed, as in gears.
+_GEARS = 0.2
 # No more than a few blows tell it: begun in the middle, and refined with the rest.
-_HALF = 0.5
+_MIDDLE = 0.5
 FLANK_DAMPING = Parameter(
     "flank_damping", DIMENSIONLESS, _flank_bounds, logarithmic=False,
     resolution=Resolution(1, 1, None, 2),
@@ -165,7 +166,7 @@ class ElasticBacklash(AbstractDryLoad):
     @property
     def damping(self):
         """The damping ratio of the load on its flank, below one."""
-        return _STEEL
+        return _GEARS
 
     @property
     def decay(self):
@@ -240,9 +241,10 @@ class DampedBacklash(ElasticBacklash):
 
 
 class OiledBacklash(DampedBacklash):
-    """[`DampedBacklash`][] with flanks that give back less of a blow than bare steel does.
+    """[`DampedBacklash`][] with flanks of which it is found how much of a blow they give back.
 
-    `flank_damping`: the damping ratio of the load on its flank, below one.
+    `flank_damping` ζ: the damping ratio of the load on its flank, below one. As flanks do not pull,
+    e^(−ζθ/√(1 − ζ²)) of a blow's speed comes back, θ = atan2(2ζ√(1 − ζ²), 2ζ² − 1).
     """
 
     flank_damping: Float[Array, ""] | float = UNKNOWN
@@ -264,7 +266,7 @@ def gaps(term: AbstractTerm, view: View) -> np.ndarray:
     # is mostly as large as its dry one, or of no account.
     widths, windups = (np.geomspace(least, high[0], n) for n in (10, 4))
     speeds = view.limits.fastest * np.array([1.0, 5.0])
-    flanks = [np.array([_HALF])] if isinstance(term, OiledBacklash) else []
+    flanks = [np.array([_MIDDLE])] if isinstance(term, OiledBacklash) else []
     return product([widths, windups, coasting(view), speeds, uneven(view), *flanks])
 
 
