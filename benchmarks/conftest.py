@@ -1,6 +1,13 @@
 import jax
 import pytest
 
+from jaxfric import programs
+
+
+def pytest_configure(config):
+    """Loops are compiled as the command does, if none was yet."""
+    programs.use_quick_loops()
+
 
 @pytest.fixture(autouse=True, scope="session")
 def float64():

@@ -52,6 +52,7 @@ def pytest_configure(config):
         os.environ["XLA_FLAGS"] = " ".join(
             [*os.environ.get("XLA_FLAGS", "").split(), *known(QUICK)]
         )
+        programs.use_quick_loops()
 
 
 # Compiling takes longer than any deadline, and a test that fails must fail again when it is rerun.

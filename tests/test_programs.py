@@ -1,5 +1,6 @@
 """How functions are compiled: the same results, a user's law as it stands, and jax's own cache."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -131,3 +132,38 @@ def test_where_the_folder_is(monkeypatch, tmp_path):
     monkeypatch.delenv("JAXFRIC_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert programs.cache_folder() == tmp_path / "jaxfric"
+
+
+LOAD = """
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxfric import Recording
+from jaxfric.terms.transmission import load_motion
+
+jax.config.update("jax_enable_x64", True)
+time = np.arange(2000) / 1000
+log = Recording(time, 0 * time, 0.02 * np.cos(9 * time), -0.18 * np.sin(9 * time))
+load = jax.vmap(lambda gap: load_motion(log, jnp.array(300.0), 0.2, jnp.array(1.5), gap))
+for numbers in jax.jit(load)(np.array([1e-4, 4e-4])):
+    print(*np.asarray(numbers).ravel().astype(str))
+"""
+
+
+def test_quick_loops_give_the_same_numbers(monkeypatch):
+    plain = [each for each in os.environ["XLA_FLAGS"].split() if "backend_extra" not in each]
+    monkeypatch.setenv("XLA_FLAGS", " ".join([*plain, "--xla_cpu_enable_fast_math=false"]))
+
+    def stepped():
+        done = subprocess.run(
+            [sys.executable, "-c", LOAD], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        return np.array([line.split() for line in done.stdout.splitlines()], float)
+
+    ordinary = stepped()
+    programs.use_quick_loops()
+    flags = os.environ["XLA_FLAGS"].split()
+    assert len(flags) == len(plain) + 2  # the user's own stay
+    np.testing.assert_allclose(stepped(), ordinary, rtol=1e-9, atol=1e-12)
+    programs.use_quick_loops()
+    assert os.environ["XLA_FLAGS"].split() == flags

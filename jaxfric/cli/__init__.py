@@ -47,14 +47,15 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _configure() -> None:
-    """float64, and jax's cache of compiled programs in the user's cache folder."""
+    """float64, quick loops, and jax's cache of compiled programs in the user's cache folder."""
     # Explaining multiplies many small matrices, where several threads wait more than they work.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     import jax
 
-    from ..programs import use_cache
+    from ..programs import use_cache, use_quick_loops
 
     jax.config.update("jax_enable_x64", True)
+    use_quick_loops()
     use_cache()
     # A folder that cannot be written, an entry of a process that was killed: the program is
     # compiled anew, and the user need not hear of it.
