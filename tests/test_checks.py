@@ -200,6 +200,8 @@ def test_a_position_that_is_no_motion():
     rng = np.random.default_rng(0)
     shaking = changed(still, position=1e-6 * rng.normal(size=still.num_samples))
     assert names(shaking)[0] == "no_motion"
+    clamped = changed(still, position=1e-6 * rng.integers(-1, 2, still.num_samples))
+    assert names(clamped)[0] == "no_motion"
     jumps = np.asarray(still.position).copy()
     jumps[[3000, 7000]] += 0.02
     assert "position_spikes" in names(changed(still, position=jumps))

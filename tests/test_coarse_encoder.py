@@ -53,6 +53,8 @@ def test_structure_that_is_no_more_than_noise_is_no_reason_for_a_verdict():
     rows = np.random.default_rng(0).normal(size=2000)
     current = types.SimpleNamespace(residual=rows)
     small, large = (Structure("position", 0.2, size, 0.002, np.nan, ()) for size in (0.4, 1.2))
-    counts = structure.that_matter([small, large], current, 20.0)
+    counts = structure.that_matter([small, large], current, 20.0, 0.0)
     assert counts == [large]  # beside samples that scatter by 20 N it is 0.02 % of their power
-    assert structure.that_matter([small], current, 2.0) == [small]
+    assert structure.that_matter([small], current, 2.0, 0.3) == [small]
+    # What answers the counts is larger than the one and smaller than the other.
+    assert structure.that_matter([small, large], current, 2.0, 0.5) == [large]

@@ -318,6 +318,7 @@ def test_what_a_held_out_recording_holds_at_one_moment_is_told_with_that(monkeyp
         undelayed=types.SimpleNamespace(problem=problem), problem=problem
     )
     monkeypatch.setattr(errors, "_fitted_there", lambda solution: left)
+    monkeypatch.setattr(summary, "farther", lambda problem: "")
     assert errors.brief(findings) == about
     fit = {
         "filtered_force_error": {"after": 0.001},

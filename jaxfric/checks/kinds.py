@@ -46,8 +46,9 @@ KINDS = (
         "velocity_scale",
         True,
         "The position moves {value:.4g} times as fast as the velocity column says, so the two are "
-        "in different units{guess}. Give --scale velocity={value:.6g}, or leave the column out: "
-        "--columns velocity= .",
+        "in different units{guess}. Give --scale velocity={factor:.6g}, or leave the column out: "
+        "--columns velocity= . If the position's unit is the wrong one: --scale "
+        "position={inverse:.6g}.",
     ),
     Kind(
         "time_scale",
@@ -374,10 +375,11 @@ _FACTORS = {
 _CLOCKS = {"ms": 1e-3, "µs": 1e-6, "ns": 1e-9}
 
 
-def _guess(name: str, value: float) -> str:
+def _guess(name: str, value: float) -> tuple[str, float]:
+    """What two units may be, and the factor between them; the value itself where none is near."""
     factors = _CLOCKS if name == "time_scale" else _FACTORS
-    near = [name for name, factor in factors.items() if abs(value / factor - 1) < 0.03]
-    return f" ({near[0]}?)" if near else ""
+    near = [(f" ({name}?)", f) for name, f in factors.items() if abs(value / f - 1) < 0.03]
+    return near[0] if near else ("", value)
 
 
 def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
@@ -390,7 +392,8 @@ def remarks(values, units: Mapping[str, str]) -> tuple[Remark, ...]:
             continue
         at = numbers.get(f"{kind.name}_at", np.nan)
         words = {"size": abs(value), "sooner": "later" if value < 0 else "earlier"}
-        guess = _guess(kind.name, value)
-        text = kind.text.format(value=value, at=at, guess=guess, **words, **units)
+        guess, factor = _guess(kind.name, value)
+        words |= {"guess": guess, "factor": factor, "inverse": 1 / factor if factor else np.inf}
+        text = kind.text.format(value=value, at=at, **words, **units)
         found.append(Remark(kind.name, text, kind.severe))
     return tuple(sorted(found, key=lambda remark: not remark.severe))

@@ -101,7 +101,11 @@ def speed_faults(velocity: np.ndarray, valid: np.ndarray, unit: str) -> dict[str
 
 
 def position_faults(recording: Recording, clock: Clock) -> dict[str, float]:
-    """Lone samples of the position: one such makes its second difference g, −2 g, g."""
+    """A position that stays where it is, and lone samples: one such makes its second difference g,
+    −2 g, g.
+    """
+    if recording.velocity is None and _rests(recording):
+        return {"no_motion": 0.0}
     position, time = np.asarray(recording.position, float), np.asarray(recording.time, float)
     whole = clock.linked[1:] & clock.linked[:-1]
     bend = np.diff(position, 2) / np.maximum(np.diff(time)[1:] + np.diff(time)[:-1], 1e-300)
@@ -114,6 +118,14 @@ def position_faults(recording: Recording, clock: Clock) -> dict[str, float]:
     if goal is not None and np.array_equal(np.asarray(goal, float), position, equal_nan=True):
         found["position_is_reference"] = 1.0
     return found
+
+
+def _rests(recording: Recording) -> bool:
+    """Whether the position shows no more than an encoder at rest: a count and the two beside it."""
+    position = np.asarray(recording.position, float)[np.asarray(recording.mask)]
+    moved = np.abs(np.diff(position))
+    moved = moved[moved > 0]
+    return not moved.size or bool(np.nanmax(position) - np.nanmin(position) < 2.5 * moved.min())
 
 
 def unsteady(recording: Recording, clock: Clock) -> dict[str, float]:

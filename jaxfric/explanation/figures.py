@@ -67,6 +67,7 @@ class Figures:
         self._moving: dict[Hashable, np.ndarray] = {}
         self._known: dict[Hashable, np.ndarray] = {}
         self._sampled: dict[Hashable, Samples] = {}
+        self._answered: dict[Hashable, float] = {}
         self._errors: dict[Hashable, tuple[float, np.ndarray]] = {}
 
     def held_from(self, place: float) -> None:
@@ -203,6 +204,22 @@ class Figures:
             self._sampled[key] = Samples.of(self._left(model, "here"), force, time, counted)
         return self._sampled[key]
 
+    def of_counts(self, model: Model) -> float:
+        """What of the force that a model leaves answers the counts of the encoder, N, root mean
+        square.
+        """
+        rest = self.samples(model).rest
+        return float(np.sqrt(np.mean(rest**2))) * self._answers(model, "here")
+
+    def _answers(self, model: Model, where: str) -> float:
+        """The part of it in amplitude; computed once."""
+        key = self._key(model, where)
+        if key not in self._answered:
+            moving, _ = self._samples(where, delay_of(model))
+            share = answered(self._left(model, where), moving, self._motion(where))
+            self._answered[key] = float(np.sqrt(share))
+        return self._answered[key]
+
     def floor(
         self, model: Model, lag: float, tone: Structure | None = None, where: str = "here"
     ) -> float:
@@ -235,7 +252,5 @@ class Figures:
             noise = max(noise, step / np.sqrt(12))
         total = power(force, moving)
         alone = noise * np.sqrt(np.count_nonzero(moving) / total) if total > 0 else float("nan")
-        counted = relative(rest, force, moving) * np.sqrt(
-            answered(rest, moving, self._motion(where))
-        )
+        counted = relative(rest, force, moving) * self._answers(model, where)
         return min(float(np.hypot(alone, counted)), whole)  # noise is no more than all of it

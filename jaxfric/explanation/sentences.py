@@ -4,6 +4,8 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from ..identification.uncertainty import Estimate
 from ..simulators.columns import GAIN
 from ..terms.effect import ANY, Effect, Extent
@@ -11,6 +13,7 @@ from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..terms.slow import CHANGES
 from ..units import FORCE
+from .fewest import SURE
 from .quantities import UNSEEN, nil, quantity, turns, unseen
 
 NOWHERE = Extent()
@@ -207,6 +210,39 @@ def parameter(name: str) -> str:
     return _SPOKEN.get(stem, stem.replace("_", " ")) + _SIDES[side]
 
 
+# The Coulomb levels of either direction, and what changes both by a constant force.
+SIDES = ("coulomb+", "coulomb-")
+CONSTANT_APART = "A weight, a tilt or a zero of the sensor changes so, and a load that wanders."
+
+
+def constant_force(
+    forwards: tuple[float, float], backwards: tuple[float, float]
+) -> tuple[float, float] | None:
+    """The constant force, N, with its standard error, that adds to the Coulomb level of one
+    direction what it takes off the other's; `None` where the changes, each with its error, are
+    not opposite.
+    """
+    (rise, first), (fall, second) = forwards, backwards
+    error = math.hypot(first, second)
+    return None if abs(rise + fall) > SURE * error else (0.5 * (rise - fall), 0.5 * error)
+
+
+def _as_constant(moved) -> str:
+    """That the changes of both Coulomb levels are those of a constant force, a sentence."""
+    if not {*SIDES} <= set(moved):
+        return ""
+    changes = [moved[side].change for side in SIDES]
+    found = constant_force(*((float(c.value), float(c.standard_error)) for c in changes))
+    if found is None:
+        return ""
+    change, error = found
+    force = Estimate(np.float64(change), np.float64(error), changes[0].unit)
+    return (
+        f" Both Coulomb levels change as by a constant force of {quantity(force)}, with the same "
+        f"friction. {CONSTANT_APART}"
+    )
+
+
 def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()) -> str:
     """Values that another recording had otherwise, as a sentence; ± of the change, 95 %."""
     parts = []
@@ -222,7 +258,7 @@ def changed_sentence(moved, share: float, other: str, rivals: Sequence[str] = ()
     text = ", ".join(parts)
     text = text[:1].upper() + text[1:]
     text = f"{text} since {other or 'the other recording'}; {share:.0%} of the difference"
-    return f"{text}{indistinct(rivals)}."
+    return f"{text}{indistinct(rivals)}.{_as_constant(moved)}"
 
 
 def factor_sentence(

@@ -104,14 +104,18 @@ def lasting(
     return repeated(found, current, with_predictions(problem.held, current), seed)
 
 
-def that_matter(found: list[Structure], current: Fit, left: float) -> list[Structure]:
+def that_matter(
+    found: list[Structure], current: Fit, left: float, counted: float
+) -> list[Structure]:
     """The structure of a fit's residual that is a reason for a verdict, though it has no name.
 
     It is none where it is smaller than what differs from row to row, and the force error by samples
-    would be less by under a hundredth of itself without it: then what is left is no more than noise
-    makes. `left` of the force at the samples, N, root mean square.
+    would be less by under a hundredth of itself without it, or no more of that than answers the
+    counts: then what is left is no more than noise makes. `left` of the force at the samples, and
+    `counted`, what of that answers the counts of the position, N, root mean square each.
     """
-    noise, unseen = fast(current), left * float(np.sqrt(1 - (1 - UNSEEN) ** 2))
+    unseen = max(left * float(np.sqrt(1 - (1 - UNSEEN) ** 2)), counted)
+    noise = fast(current)
     return [each for each in found if each.size > min(noise, unseen)]
 
 

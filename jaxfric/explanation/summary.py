@@ -16,6 +16,7 @@ from .curves import curves
 from .doubts import accelerates, creeping, doubts, not_better
 from .errors import brief, document, filtered_errors
 from .explained import Explanation
+from .farther import farther
 from .figures import Figures
 from .finding import Finding
 from .findings import Findings
@@ -25,10 +26,10 @@ from .mismatch import Mismatch
 from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, with_size, wrong_values
 from .selection import Selection
+from .sentences import CONSTANT_APART
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
 from .wording import (
-    CONSTANT_APART,
     ELSEWHERE,
     HOLDS_MORE,
     HOLDS_OTHER,
@@ -70,13 +71,15 @@ def summarise(
         remarks = [*remarks, *_doubts(better)]
     tone = tone_left(better.findings, figures)
     errors = document(better, filtered, models[1], figures, tone)
-    apart = _elsewhere(errors, effects, better.findings)
+    wrong_data = not findings and any(remark.severe for remark in remarks)
+    apart = [] if wrong_data else _elsewhere(errors, effects, better.findings)
     remarks = [*remarks, *apart]
     tones, samples = [], figures.samples(models[1])
     if tone is not None:
         remarks.append(beyond.remark(tone, samples))
         tones = [tone] if beyond.matters(tone, samples) else []
-    there, later = _that_matter(before.counts, after, better, bool(findings), samples)
+    sizes = None if findings else (beyond.rms(samples.rest), figures.of_counts(models[1]))
+    there, later = _that_matter(before.counts, after, better, sizes)
     new, later = (
         [s for s in some if s.coordinate not in known.structured] + tones for some in (there, later)
     )
@@ -116,19 +119,18 @@ def _that_matter(
     before: list[Structure],
     after: list[Structure],
     better: Improved,
-    named: bool,
-    samples: beyond.Samples,
+    sizes: tuple[float, float] | None,
 ) -> tuple[list[Structure], list[Structure]]:
     """What is a reason for a verdict of the structure that the baseline and the findings leave.
 
-    Beside findings, where anything is `named`, all of it: what they leave is theirs to explain.
+    Beside findings, of which there are no `sizes`, all of it: what they leave is theirs to explain.
     """
-    if named:
+    if sizes is None:
         return before, after
-    left, last = beyond.rms(samples.rest), better.findings.undelayed.selection.last
+    last = better.findings.undelayed.selection.last
     return (
-        structure.that_matter(before, better.first, left),
-        structure.that_matter(after, last, left),
+        structure.that_matter(before, better.first, *sizes),
+        structure.that_matter(after, last, *sizes),
     )
 
 
@@ -254,7 +256,8 @@ def _elsewhere(
                 f"most of that about t = {about:.4g} s. Either {acts}, or the motion is too quick "
                 f"there for a filter of {found.problem.evidence.reach:.2g} s, as this log needs"
             )
-        text += ". Explain that one, with this one held out."
+        text += "." if found is None else f".{farther(found.problem)}"
+        text += " Explain that one, with this one held out."
         return [Remark(HOLDS_MORE, text, False)]
     text = (
         f"The held-out recording is left with {held['after']:.0%} of its force, and with "

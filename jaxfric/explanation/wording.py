@@ -8,8 +8,9 @@ from ..checks import LEFT
 from ..data.printable import listed_and
 from ..terms.effects import EFFECTS
 from .beyond import FAST_TONE
-from .fewest import SHAPE, SURE
+from .fewest import SHAPE
 from .finding import Finding
+from .sentences import CONSTANT_APART, SIDES, constant_force
 
 VERDICTS = {
     "consistent": "Nothing is missing: what the model leaves is no more than noise.",
@@ -69,6 +70,8 @@ def summary(
     if not severe and describes_nothing(fit["force_error"]["before"], fit.get("noise_floor")):
         errors = f"{errors} {nothing_described(verdict)}"
     whole = [*severe, said, *other, *refuted, errors]
+    if severe and not findings:  # of such data there is no more to say
+        return " ".join(whole)
     told = any(each["name"] in (HOLDS_MORE, HOLDS_OTHER) for each in warnings)
     more = [] if told else _more_there(fit, verdict)
     elsewhere = _not_determined(fit, verdict, findings, told)
@@ -278,9 +281,6 @@ def begins_anew(findings: Sequence[Finding]) -> str:
     )
 
 
-CONSTANT_APART = "A weight, a tilt or a zero of the sensor changes so, and a load that wanders."
-
-
 def constant_apart(fit: Mapping[str, Any]) -> str | None:
     """The constant force by which the held-out recording alone differs, in words; `None` where it
     differs otherwise.
@@ -291,15 +291,14 @@ def constant_apart(fit: Mapping[str, Any]) -> str | None:
     if set(values) == {"offset"}:
         (one,) = values.values()
         change, error = one["there"] - one["here"], one["standard_error"]
-    elif set(values) == {"coulomb+", "coulomb-"}:
-        both = values["coulomb+"], values["coulomb-"]
-        (rise, fall), errors = zip(
-            *((v["there"] - v["here"], v["standard_error"]) for v in both), strict=True
+    elif set(values) == {*SIDES}:
+        one, other = (values[side] for side in SIDES)
+        found = constant_force(
+            *((v["there"] - v["here"], v["standard_error"]) for v in (one, other))
         )
-        if abs(rise + fall) > SURE * math.hypot(*errors):
+        if found is None:
             return None
-        change, error = 0.5 * (rise - fall), 0.5 * math.hypot(*errors)
-        one = both[0]
+        change, error = found
     else:
         return None
     digits = max(0, 1 - math.floor(math.log10(2 * error)))

@@ -76,12 +76,15 @@ class Drift(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What is usual in a fleet, and what is not; `tried`, how many outliers and drifts."""
+    """What is usual in a fleet, and what is not; `tried`, how many outliers and drifts; `most`, how
+    many recordings the axis has that has most, zero where no axes are named.
+    """
 
     usual: tuple[Usual, ...]
     outliers: tuple[Outlier, ...]
     drifts: tuple[Drift, ...]
     tried: tuple[int, int]
+    most: int = 0
 
 
 class _Values(NamedTuple):
@@ -103,7 +106,8 @@ def compare(files: Sequence[File], rows: Mapping[str, Row]) -> Summary:
     chances = corrected(np.array([drift.chance for drift in drifts]))
     drifts = [d._replace(chance=float(c)) for d, c in zip(drifts, chances, strict=True)]
     drifts.sort(key=lambda drift: drift.chance)
-    return Summary(usual, outliers, tuple(drifts), (tried, len(drifts)))
+    most = max((len(v.files) for _, v in axes), default=0)
+    return Summary(usual, outliers, tuple(drifts), (tried, len(drifts)), most)
 
 
 def sound(row: Row) -> bool:

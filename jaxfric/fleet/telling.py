@@ -6,7 +6,16 @@ from collections.abc import Mapping, Sequence
 from ..data.printable import printable
 from ..identification import identified
 from ..looks.text import aligned
-from .comparing import FORCE_ERROR, LARGE, LEVEL, Drift, Summary, Usual, sound
+from .comparing import (
+    FEWEST_OF_AXIS,
+    FORCE_ERROR,
+    LARGE,
+    LEVEL,
+    Drift,
+    Summary,
+    Usual,
+    sound,
+)
 from .files import File
 from .journal import Row
 
@@ -107,6 +116,9 @@ def _outliers(found: Summary) -> list[str]:
 def _drifts(found: Summary) -> list[str]:
     tried = found.tried[1]
     shown = [drift for drift in found.drifts if drift.chance < LEVEL]
+    if found.most and not tried:
+        few = f"no axis has more than {found.most} sound recordings, and it takes {FEWEST_OF_AXIS}."
+        return ["", f"Drift: {few}"]
     if not shown:
         return ["", f"No drift among {tried} courses of an axis's parameter."] if tried else []
     table = [["drift", "slope", "± s.e.", "unit", "from", "to", "chance"]]

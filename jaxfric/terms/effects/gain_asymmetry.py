@@ -29,7 +29,8 @@ GAIN_ASYMMETRY = Effect(
     "gain_asymmetry",
     "κ max(f, 0)",
     "actuator",
-    "Positive force has a gain that differs by {gain_asymmetry}",
+    "For positive force the gain (the force that acts, by the force that is recorded) is "
+    "{gain_asymmetry:gain} than for negative force",
     laws=(GainAsymmetry,),
     coordinates=("predicted_force",),
     needs=frozenset({"predicted_force"}),
