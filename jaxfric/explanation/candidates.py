@@ -186,8 +186,7 @@ def candidates(evidence: Evidence, base: AbstractTerm) -> list[Candidate]:
         have.add(REACTION)
     if evidence.motion.position is not None:
         have.add("position")
-    turn = TURNS.get(dict(evidence.motion.units).get("position", ""))
-    turn = turn if "position" in have else None
+    turn = (seen.turn or None) if "position" in have else None
     stroke = float(evidence.limits.high - evidence.limits.low)
 
     def shows(term: AbstractTerm) -> bool:
@@ -228,6 +227,7 @@ def view(evidence: Evidence) -> View:
         float(np.median(np.abs(velocity[evidence.centre]))),
         float(np.quantile(change, 0.98)) * NODES / evidence.reach,
         float(np.clip(asymmetry, -LOPSIDED, LOPSIDED)),
+        TURNS.get(dict(evidence.motion.units).get("position", ""), 0.0),
     )
 
 

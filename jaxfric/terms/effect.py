@@ -29,7 +29,7 @@ class View(NamedTuple):
     `limits`: its scales, as floats; `reach`: the kernel's half-width, s, of `nodes` local means;
     `speed`: the median in slip, m/s; `acceleration`: 98 % of those at the nodes are below it, m/s²;
     `asymmetry`: the force forwards and that backwards, their sum by their difference, zero where
-    the axis goes one way.
+    the axis goes one way; `turn`: a revolution in the position's unit, zero of what does not turn.
     """
 
     limits: Scales
@@ -38,6 +38,7 @@ class View(NamedTuple):
     speed: float
     acceleration: float
     asymmetry: float = 0.0
+    turn: float = 0.0
 
 
 class Waves(NamedTuple):
