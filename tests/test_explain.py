@@ -539,15 +539,17 @@ def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypa
     now = types.SimpleNamespace(energy=1.0)
     monkeypatch.setattr(acceptance, "_alike", lambda finalist, now, view, *_: view == "between")
 
-    def confirmed(term, gain, between="between"):
+    def confirmed(term, gain, between="between", rougher=None):
         trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
         load = types.SimpleNamespace(trial=trial, energy=1 - gain)
-        return acceptance._confirmed(load, now, (between, "wide"), 0.03)
+        return acceptance._confirmed(load, now, (between, "wide", rougher), 0.03)
 
     swinging = terms.Compliance(20.0, 0.2)
     assert confirmed(swinging, 0.6) and confirmed(LOAD, 0.6)
     assert not confirmed(swinging, 0.4)
     assert not confirmed(swinging, 0.6, None)
+    # With a velocity that is smoothed over less it is not the same.
+    assert not confirmed(swinging, 0.6, rougher="rougher")
     assert not confirmed(terms.FrictionalLag(0.02, terms.Gaussian(0.05)), 0.6)
 
 
@@ -1399,12 +1401,12 @@ def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(h
         places = [p for p in locate.locate(seen, of.base) if p.coordinate in locate.ACCELERATED]
         assert {p.coordinate for p in places} == locate.ACCELERATED
         plain = places[0]._replace(coordinate="velocity")
-        kept = structure.through_wide([*places, plain], of.base, of.wide, 0)
+        kept = structure.in_others([*places, plain], of.base, of.wide, 0)
         judged[name] = {p.coordinate for p in kept}
         # What the wide rows show much smaller, however large it is here, is noise.
         larger = [p._replace(size=3 * p.size) for p in places]
-        assert structure.through_wide(larger, of.base, of.wide, 0) == []
-        assert structure.through_wide(places, of.base, None, 0) == places
+        assert structure.in_others(larger, of.base, of.wide, 0) == []
+        assert structure.in_others(places, of.base, None, 0) == places
     assert judged["healthy"] == {"velocity"}
     assert judged["pulled"] >= {"velocity", "acceleration"}
 
@@ -1947,11 +1949,15 @@ def test_what_a_law_halves_is_no_noise_though_it_was_not_accepted():
         finalist = types.SimpleNamespace(energy=energy, p_value=p_value)
         return types.SimpleNamespace(finalists=[finalist], energy=beside)
 
-    assert verdict.halvable(contest(0.4, 0.002))
-    assert not verdict.halvable(contest(0.6, 0.002))
-    assert not verdict.halvable(contest(0.4, 0.3))
+    def physics(finalist):
+        return False
+
+    assert verdict.halvable(contest(0.4, 0.002), physics)
+    assert not verdict.halvable(contest(0.4, 0.002), lambda finalist: True)  # made by smoothing
+    assert not verdict.halvable(contest(0.6, 0.002), physics)
+    assert not verdict.halvable(contest(0.4, 0.3), physics)
     # Beside a term that was refuted later, which has removed half by itself.
-    assert not verdict.halvable(contest(0.4, 0.002, 0.5))
+    assert not verdict.halvable(contest(0.4, 0.002, 0.5), physics)
 
 
 @pytest.mark.parametrize(

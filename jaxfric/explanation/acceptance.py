@@ -7,7 +7,7 @@ import numpy as np
 from ..terms.effect import Effect
 from .evidence import Evidence
 from .predictions import with_predictions
-from .problem import BETWEEN, LEAST_SHARE, LINEARITY, WideKernels
+from .problem import BETWEEN, LEAST_SHARE, LINEARITY, OtherRows
 from .regression import Fit, fast, fit
 from .selection import SelectedTerm
 from .significance import DRAWS, LEVEL
@@ -42,8 +42,9 @@ NEARLY_ALL = 0.75
 
 
 def accepted(
-    round_: Contest, current: Fit, evidence, wider, base: Fit, selected: list[SelectedTerm]
-) -> Finalist | None:
+    round_: Contest, current: Fit, evidence, others: OtherRows, base: Fit,
+    selected: list[SelectedTerm],
+) -> Finalist | None:  # fmt: skip
     """The best finalist that passes, beside the terms selected before; `None` if none does."""
     least = _least_share(selected)
     for finalist in round_.finalists:
@@ -55,7 +56,7 @@ def accepted(
         level = RAREST if effect.sharp or effect.momentary else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if (effect.sharp or term.swings) and not _confirmed(finalist, current, wider, least):
+        if (effect.sharp or term.swings) and not _confirmed(finalist, current, others, least):
             continue
         return finalist
     return None
@@ -117,21 +118,34 @@ def _again(finalist: Finalist, selected: list[SelectedTerm]) -> bool:
 HALF = 0.5
 
 
-def _confirmed(finalist: Finalist, current: Fit, wider: WideKernels, least: float) -> bool:
-    """Whether a term is the same through a kernel of twice the width.
+def _confirmed(finalist: Finalist, current: Fit, others: OtherRows, least: float) -> bool:
+    """Whether a term is the same through a kernel of twice the width, and is not of smoothing.
 
     There the noise of the derivatives is 2⁵ to 2⁷ times weaker in power, the physics hardly. But a
     load may swing above that kernel's band. If it removes half of the residual, which noise of the
     encoder through the controller never did on machines without effects (a quarter at most), a
     kernel of 4/3 of the width will do.
     """
-    between, wide = wider
+    between, wide, rougher = others
+    if of_smoothing(finalist, current, rougher, least):
+        return False
     if wide is None or _alike(finalist, current, wide, 2.0, least):
         return True
     term = finalist.trial.candidate.term
     most = current.energy - finalist.energy >= HALF * current.energy
     loud = term.swings and most and between is not None
     return loud and _alike(finalist, current, between, BETWEEN, least)
+
+
+def of_smoothing(
+    finalist: Finalist, current: Fit, rougher: Evidence | None, least: float = LATER_SHARE
+) -> bool:
+    """Whether a term is not the same where the velocity is smoothed over less.
+
+    What smoothing takes off the velocity looks like a load on a spring, and is a fifth as much
+    there.
+    """
+    return rougher is not None and not _alike(finalist, current, rougher, 2.0, least)
 
 
 def _alike(finalist: Finalist, current: Fit, wide: Evidence, factor: float, least: float) -> bool:

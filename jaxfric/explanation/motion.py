@@ -18,13 +18,16 @@ class Motion(NamedTuple):
 
     `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
     few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
-    `signals.smoothing`; `repeats`: the time, s, after which it repeats itself to a count, or zero.
+    `signals.smoothing`; `repeats`: the time, s, after which it repeats itself to a count, or zero;
+    `polynomial`: the half-width, in samples, of the local polynomial that the velocity is derived
+    by, zero where it is recorded.
     """
 
     recording: Recording
     padded: Recording
     smoothed: float
     repeats: float = 0.0
+    polynomial: int = 0
 
     def forced(self, force: Any) -> "Motion":
         """The same motion with another force, N, `(N,)`."""
@@ -51,8 +54,10 @@ def from_position(recording: Recording) -> Recording:
     return dataclasses.replace(recording, velocity=None)
 
 
-def derived(recording: Recording) -> Motion:
-    """The motion of a recording by its velocity, where it has one."""
+def derived(recording: Recording, narrower: float = 1.0) -> Motion:
+    """The motion of a recording by its velocity, where it has one; else by a local polynomial of
+    the width that tells it best, or of so much of that.
+    """
     # The name and the number of segments would be compiled in.
     nameless = dataclasses.replace(
         recording, source="", sha256="", num_segments=1, position_every=1
@@ -60,12 +65,14 @@ def derived(recording: Recording) -> Motion:
     bare = without_known(nameless)
     bare = dataclasses.replace(bare, mask=moves(recording))
     padded, whole = (pad(log, padded_length(recording.num_samples)) for log in (bare, nameless))
-    smoothed = 0.0
+    smoothed, polynomial = 0.0, 0
     if padded.velocity is None:
         choice = signals.choose(padded)
+        polynomial = max(1, round(narrower * choice.half_width))
+        choice = choice._replace(half_width=polynomial)
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
     padded = dataclasses.replace(padded, mask=whole.mask, channels=whole.channels)
-    return Motion(recording, padded, smoothed, repeated_after(recording))
+    return Motion(recording, padded, smoothed, repeated_after(recording), polynomial)
 
 
 def moves(recording: Recording) -> np.ndarray:

@@ -14,7 +14,7 @@ from .candidates import CandidateSet
 from .evidence import Evidence, gather
 from .fewest import fewest
 from .least_squares import orthonormal
-from .motion import Motion, motion_of
+from .motion import Motion, derived, motion_of
 from .predictions import with_predictions
 from .regression import Fit, fit
 from .reversals import creeps, yields
@@ -33,14 +33,28 @@ BETWEEN = 4 / 3
 # Force that acts is as large through a kernel of twice the width. The noise of the acceleration is
 # 2⁵ to 2⁷ times weaker there in power; halfway between, on a scale of ratios, tells them apart.
 PERSISTS = 2**-1.25
-# Rows through that kernel and through the widest; `None` where too few would be left.
-WideKernels = tuple[Evidence | None, Evidence | None]
+# A local polynomial of this part of the width takes a fifth as much off a motion that it cannot
+# follow (a quartic's error goes with the fourth power), and has two to three times the noise.
+NARROWER = 2 / 3
+
+
+class OtherRows(NamedTuple):
+    """Rows of the same recording in which a law has to be the same; `None` where too few would be
+    left, or where they say nothing else.
+
+    `between`, `wide`: through kernels of 4/3 and of twice the width; `rougher`: with a velocity
+    that is smoothed over less, where it is over more than the kernel.
+    """
+
+    between: Evidence | None
+    wide: Evidence | None
+    rougher: Evidence | None
 
 
 class Problem(NamedTuple):
     """The rows of a recording, and the baseline fitted to them.
 
-    - `evidence`: the rows; `wide`, `between`: through kernels of twice and 4/3 of the width.
+    - `evidence`: the rows; `wide`, `between`, `rougher`: see `OtherRows`.
     - `base`: the fit of the baseline, whose terms are `structure`.
     - `block`: number of each row's block.
     - `candidate_sets`: the candidates with their columns, for these rows first, then for other
@@ -64,6 +78,7 @@ class Problem(NamedTuple):
     creeps: bool = False
     held: Evidence | None = None
     start: np.ndarray | None = None
+    rougher: Evidence | None = None
 
     @property
     def reversals(self) -> bool:
@@ -86,9 +101,9 @@ class Problem(NamedTuple):
             candidates.forget()
 
     @property
-    def wide_kernels(self) -> WideKernels:
-        """The rows through kernels of 4/3 and of twice the width."""
-        return self.between, self.wide
+    def other_rows(self) -> OtherRows:
+        """The rows by which a law is confirmed."""
+        return OtherRows(self.between, self.wide, self.rougher)
 
 
 def problem_of(
@@ -207,7 +222,20 @@ def _assembled(
     ours = ours or CandidateSet(evidence, structure, candidate_sets[0])
     every = (ours, *(some for some in candidate_sets if some is not ours))
     between = _wider(motion, evidence, delay, across, BETWEEN)
-    return Problem(evidence, wide, between, base, block, structure, every, delay)
+    rougher = _rougher(motion, evidence, delay, across)
+    return Problem(evidence, wide, between, base, block, structure, every, delay, rougher=rougher)
+
+
+def _rougher(motion: Motion, narrow: Evidence, delay: float, across: bool) -> Evidence | None:
+    """The rows with a velocity that is smoothed over less; `None` where it is recorded, or is
+    smoothed over no more than the kernel.
+    """
+    if motion.polynomial <= narrow.width:
+        return None
+    try:
+        return gather(derived(motion.recording, NARROWER), narrow.width, delay, across)
+    except ValueError:
+        return None
 
 
 def _wider(

@@ -75,7 +75,7 @@ def select(
         spoiling = [f for f in found.finalists if f.trial.candidate.form in refused]
         allowed = [f for f in found.finalists if f.trial.candidate.form not in refused]
         found = found._replace(finalists=allowed)
-        best = accepted(found, current, evidence, problem.wide_kernels, problem.base, selected)
+        best = accepted(found, current, evidence, problem.other_rows, problem.base, selected)
         enough = (f for f in allowed if current.energy - f.energy >= least(f.trial))
         strong = next((f for f in enough if f.score >= RIVAL), None)
         return Round(found, current, evidence, best, spoiling, strong)

@@ -53,7 +53,8 @@ def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int)
     """
     located = locate(with_predictions(problem.evidence, current), current, seed)
     found = significant(located, share, size)
-    found = through_wide(found, current, problem.wide, seed)
+    for others in (problem.wide, problem.rougher):
+        found = in_others(found, current, others, seed)
     return Shown(lasting(found, current, problem, seed), located[:1])
 
 
@@ -62,19 +63,20 @@ def significant(found: list[Structure], share: float, size: float) -> list[Struc
     return [s for s in found if s.p_value <= LEVEL and s.share >= share and s.size >= size]
 
 
-def through_wide(
-    found: list[Structure], current: Fit, wide: Evidence | None, seed: int
+def in_others(
+    found: list[Structure], current: Fit, others: Evidence | None, seed: int
 ) -> list[Structure]:
-    """Without structure that a kernel of twice the width does not show, or shows much smaller.
+    """Without structure that other rows do not show, or show much smaller: through a kernel of
+    twice the width, or with a velocity that is smoothed over less.
 
     Tested are curves that hold the acceleration, whose noise is in the residual too: by the loop's
     answer to the encoder, and in the torque of another simulator, which is its inertia times the
     recorded acceleration.
     """
-    if wide is None or not any(s.coordinate in ACCELERATED for s in found):
+    if others is None or not any(s.coordinate in ACCELERATED for s in found):
         return found
-    again = fit(current.terms, with_predictions(wide, current), current.betas, 4)
-    located = locate(with_predictions(wide, again), again, seed, lines=False)
+    again = fit(current.terms, with_predictions(others, current), current.betas, 4)
+    located = locate(with_predictions(others, again), again, seed, lines=False)
     there = {s.coordinate: s for s in located if s.p_value <= LEVEL and s.share >= LEAST_SHARE}
 
     def lasts(each: Structure) -> bool:

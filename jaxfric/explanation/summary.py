@@ -10,7 +10,7 @@ from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..terms.effects import EFFECTS
 from . import beyond, parameters as spelled, structure, verification
-from .acceptance import LINEARITY, OF_BASE
+from .acceptance import LINEARITY, OF_BASE, of_smoothing
 from .baseline import Baseline
 from .curves import curves
 from .doubts import accelerates, creeping, doubts, not_better
@@ -27,6 +27,7 @@ from .partial_residuals import moved as moved_curve, partial_residuals
 from .reported import NO_POSITION, not_confirmed, reported, with_size, wrong_values
 from .selection import Selection
 from .sentences import CONSTANT_APART
+from .trials import Finalist
 from .uncertainty import estimated
 from .verdict import beside_rows, halvable, halved, rough, stand_ins, verdict_of
 from .wording import (
@@ -173,9 +174,13 @@ def _halvable(findings: Findings, filtered: Mapping[str, Any]) -> bool:
     """Whether a law that was not accepted halves what is left, of more than a sensor resolves: a
     part of its full scale, which is the largest force at least.
     """
-    evidence = findings.problem.evidence
-    left = filtered["force_error"]["after"] * float(np.sqrt(np.mean(evidence.force**2)))
-    return left > LINEARITY * evidence.peak and halvable(findings.selection.remaining)
+    problem, selection = findings.recorded
+    left = filtered["force_error"]["after"] * float(np.sqrt(np.mean(problem.evidence.force**2)))
+
+    def made(finalist: Finalist) -> bool:
+        return of_smoothing(finalist, selection.last, problem.rougher)
+
+    return left > LINEARITY * problem.evidence.peak and halvable(selection.remaining, made)
 
 
 def _drawn(

@@ -1,6 +1,6 @@
 """The verdict: whether findings account for the mismatch, and what is left of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from ..terms.effects import EFFECTS
 from .acceptance import LINEARITY, OF_BASE
 from .finding import Finding
 from .significance import LEVEL
-from .trials import Contest
+from .trials import Contest, Finalist
 from .wording import LARGE
 
 # Slow hidden loads of healthy machines make a residual up to about twice as large as its own fast
@@ -75,15 +75,17 @@ def halved(refuted: Sequence[Finding]) -> bool:
     return any(finding.share > 1 - HALF**2 for finding in refuted)
 
 
-def halvable(remaining: Contest) -> bool:
-    """Whether a law that was not accepted removes half of what is left, beyond chance.
+def halvable(remaining: Contest, made: Callable[[Finalist], bool]) -> bool:
+    """Whether a law that was not accepted removes half of what is left, beyond chance, and not what
+    was `made` by smoothing.
 
     Noise cannot be halved, that of the encoder by the controller's answer neither: then something
     is missing, though that law is not its name. Half of what the model leaves that it competed
     beside: what the held-out recording refuted later has removed its part there.
     """
     left = remaining.energy * (1 - HALF)
-    return any(f.p_value <= LEVEL and f.energy < left for f in remaining.finalists)
+    halving = [f for f in remaining.finalists if f.p_value <= LEVEL and f.energy < left]
+    return not all(made(finalist) for finalist in halving)
 
 
 # Of two effects that are there each has a part of its own; of three or more that share a quarter of

@@ -82,8 +82,16 @@ def _rounding(signal: np.ndarray, seen: float) -> float:
     return count * float(np.sqrt(lasting / 12))
 
 
+# A log that rounds counts to decimals holds no whole multiples of one; nine of ten are this near to
+# them. That says more than chance only where the signal stays for samples between two counts, as
+# one that is not counted never does.
+DECIMALS, STAYS = 0.05, 0.1
+
+
 def count_of(signal: np.ndarray) -> float:
-    """The step that all changes of a signal, `(N,)`, are multiples of; zero where there is none."""
+    """The step that all changes of a signal, `(N,)`, are multiples of, but for the decimals that a
+    log has; zero where there is none.
+    """
     changes = np.flatnonzero(np.diff(signal))
     if len(changes) < SHORT:
         return 0.0
@@ -92,6 +100,14 @@ def count_of(signal: np.ndarray) -> float:
     if count < np.finfo(float).eps * float(np.max(moved)):
         return 0.0
     # Of uncounted steps one in a hundred is this near a whole number of counts by chance.
-    off = np.abs(moved / count - np.rint(moved / count))
     exact = np.finfo(float).eps * np.max(np.abs(signal)) < 1e-4 * count
-    return count if exact and np.quantile(off, 0.9) <= 5e-3 else 0.0
+    if exact and _off(moved, count) <= 5e-3:
+        return count
+    mean = float(np.sum(moved) / np.sum(np.rint(moved / count)))
+    stays = len(signal) - 1 - len(changes) >= STAYS * len(changes)
+    return mean if exact and stays and _off(moved, mean) <= DECIMALS else 0.0
+
+
+def _off(moved: np.ndarray, count: float) -> float:
+    """By what part of a count nine of ten steps are off a whole number of them, at most."""
+    return float(np.quantile(np.abs(moved / count - np.rint(moved / count)), 0.9))

@@ -63,8 +63,8 @@ class EncoderError(AbstractLaw):
         )
 
 
-# An encoder is off once in a revolution of what it sits on, of a motor that is many in a stroke; and
-# twice, as a resolver of unequal windings.
+# An encoder is off once in a revolution of what it sits on, of a motor that is many in a stroke;
+# and twice, as a resolver of unequal windings.
 _MOST, _OF_TURN = 16, (1.0, 0.5)
 # Viscous friction by what the inertia takes, about the usual speed and acceleration.
 _VISCOUS = 0.1, 0.5, 2.5
