@@ -539,17 +539,15 @@ def test_a_load_above_the_wide_kernels_band_is_confirmed_by_one_between(monkeypa
     now = types.SimpleNamespace(energy=1.0)
     monkeypatch.setattr(acceptance, "_alike", lambda finalist, now, view, *_: view == "between")
 
-    def confirmed(term, gain, between="between", rougher=None):
+    def confirmed(term, gain, between="between"):
         trial = types.SimpleNamespace(candidate=types.SimpleNamespace(term=term))
         load = types.SimpleNamespace(trial=trial, energy=1 - gain)
-        return acceptance._confirmed(load, now, (between, "wide", rougher), 0.03)
+        return acceptance._confirmed(load, now, (between, "wide", None), 0.03)
 
     swinging = terms.Compliance(20.0, 0.2)
     assert confirmed(swinging, 0.6) and confirmed(LOAD, 0.6)
     assert not confirmed(swinging, 0.4)
     assert not confirmed(swinging, 0.6, None)
-    # With a velocity that is smoothed over less it is not the same.
-    assert not confirmed(swinging, 0.6, rougher="rougher")
     assert not confirmed(terms.FrictionalLag(0.02, terms.Gaussian(0.05)), 0.6)
 
 

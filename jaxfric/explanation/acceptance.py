@@ -56,7 +56,12 @@ def accepted(
         level = RAREST if effect.sharp or effect.momentary else LEVEL
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
-        if (effect.sharp or term.swings) and not _confirmed(finalist, current, others, least):
+        derived = effect.sharp or term.swings
+        if derived and not _confirmed(finalist, current, others, least):
+            continue
+        if (derived or effect.at_reversals) and of_smoothing(
+            finalist, current, others.rougher, least
+        ):
             continue
         return finalist
     return None
@@ -119,16 +124,14 @@ HALF = 0.5
 
 
 def _confirmed(finalist: Finalist, current: Fit, others: OtherRows, least: float) -> bool:
-    """Whether a term is the same through a kernel of twice the width, and is not of smoothing.
+    """Whether a term is the same through a kernel of twice the width.
 
     There the noise of the derivatives is 2⁵ to 2⁷ times weaker in power, the physics hardly. But a
     load may swing above that kernel's band. If it removes half of the residual, which noise of the
     encoder through the controller never did on machines without effects (a quarter at most), a
     kernel of 4/3 of the width will do.
     """
-    between, wide, rougher = others
-    if of_smoothing(finalist, current, rougher, least):
-        return False
+    between, wide, _ = others
     if wide is None or _alike(finalist, current, wide, 2.0, least):
         return True
     term = finalist.trial.candidate.term
@@ -137,15 +140,19 @@ def _confirmed(finalist: Finalist, current: Fit, others: OtherRows, least: float
     return loud and _alike(finalist, current, between, BETWEEN, least)
 
 
+# Between a force that is as large and one that is two thirds as much.
+SMOOTHED = 2**0.5
+
+
 def of_smoothing(
     finalist: Finalist, current: Fit, rougher: Evidence | None, least: float = LATER_SHARE
 ) -> bool:
     """Whether a term is not the same where the velocity is smoothed over less.
 
     What smoothing takes off the velocity looks like a load on a spring, and is a fifth as much
-    there.
+    there; near a stop within a count it looks like a friction that lags, and is two thirds as much.
     """
-    return rougher is not None and not _alike(finalist, current, rougher, 2.0, least)
+    return rougher is not None and not _alike(finalist, current, rougher, SMOOTHED, least)
 
 
 def _alike(finalist: Finalist, current: Fit, wide: Evidence, factor: float, least: float) -> bool:

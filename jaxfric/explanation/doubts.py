@@ -12,8 +12,9 @@ from ..terms.base import AbstractTerm, summands
 from ..units import VELOCITY, spell
 from .evidence import Evidence
 from .intervals import spread
+from .mismatch import SURE
 from .nodes import NODES
-from .problem import Problem
+from .problem import LINEARITY, Problem
 from .quantities import quantity, rise
 from .regression import Fit
 
@@ -24,6 +25,8 @@ CREEPS = "creeps"
 # More than half of the force's power: the model is further from the force than no force at all is
 # from what it leaves.
 UNDESCRIBED = 0.5
+# How the name of a bump's height begins.
+BUMP = "stribeck_force"
 
 
 def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
@@ -70,6 +73,29 @@ def accelerates(parameters: dict[str, Estimate]) -> bool:
     if inertia is None or not np.isfinite(inertia.standard_error):
         return False
     return bool(inertia.interval()[1] < 0)
+
+
+def falling(parameters: dict[str, Estimate], evidence: Evidence) -> str:
+    """That a bump of the baseline's curve is negative for sure, and larger than what a sensor
+    resolves; empty where none is.
+
+    The curve has taken up another force then, and nothing is left to be named.
+    """
+    found = [
+        f"{name} {quantity(each)}"
+        for name, each in parameters.items()
+        if name.startswith(BUMP)
+        and float(each.value) + SURE * float(each.standard_error) < 0
+        and -float(each.value) > LINEARITY * evidence.peak
+    ]
+    if not found or _corrects(evidence):
+        return ""
+    return (
+        f"The baseline as fitted has its bump upside down: {' and '.join(found)}. Friction falls "
+        "towards zero speed then, instead of rising. That is no Stribeck effect, and the other "
+        "values are beside it. A drag that falls again at speed (an eddy-current brake), friction "
+        "that passes zero speed gradually, presliding, lag or a dead time near reversals looks so."
+    )
 
 
 def _corrects(evidence: Evidence) -> bool:
@@ -189,6 +215,8 @@ def doubts(
                 True,
             )
         )
+    if text := falling(parameters, problem.evidence):
+        remarks.append(Remark("no_stribeck", text, False))
     if undescribed(error):
         remarks.append(
             Remark(
