@@ -273,11 +273,13 @@ def _without(findings: Findings, numbers: list[int]) -> Findings:
 
 
 def _extent(evidence: Evidence, base: Mapping[str, Estimate]) -> Extent:
-    """The range of the position, the usual force, and the inertia by the `base`'s parameters."""
+    """The range of the position, the usual force and the largest, and the inertia by the `base`'s
+    parameters.
+    """
     limits = evidence.limits
     force = float(np.sqrt(np.mean(evidence.force**2)))
     inertia = float(base["inertia"].value) if "inertia" in base else float("nan")
-    return Extent(float(limits.low), float(limits.high), force, inertia)
+    return Extent(float(limits.low), float(limits.high), force, inertia, float(limits.peak))
 
 
 def _derived(
