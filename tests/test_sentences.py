@@ -126,6 +126,17 @@ def test_the_level_of_gradual_saturation_is_told_as_extrapolated(unit, saturatio
     assert f"gradual saturation. {said}; 89% of the unexplained force." in told
 
 
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (0.0, "does not go where it acts"),
+        (0.00172, "it is but 0.17% of the force (root mean square)"),
+    ],
+)
+def test_why_the_held_out_recording_confirms_nothing_is_told(part, said):
+    assert said in reported.unconfirmed(part)
+
+
 def test_a_magnitude_whose_interval_holds_zero_is_no_number():
     values = {"knee": estimate(5.3, 1.6, "N·m"), "saturation": estimate(6.0, 111.0, "1")}
     told = sentence("actuator_saturation", values, 0.73, ())

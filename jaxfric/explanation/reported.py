@@ -34,6 +34,10 @@ NO_POSITION = (
     "recording the position tells."
 )
 ELSEWHERE = " The held-out recording does not go where it acts, and cannot confirm it."
+FAINT = (
+    " On the held-out recording it is but {0:.2%} of the force (root mean square), too little to "
+    "confirm it."
+)
 REST = (
     " Its size is not known together with its shape, and it is little beside the other findings: "
     "it may be what those have not quite the shape of."
@@ -78,7 +82,7 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             text += REPHASED
         unheard = selected.confirmed is None and not effect.momentary
         if findings.problem.held is not None and unheard:
-            text += ELSEWHERE
+            text += unconfirmed(_part_there(findings, number))
         if effect.late and not evidence.located:
             text += f" {NO_POSITION}"
         result.append(
@@ -225,6 +229,17 @@ def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Find
                 part = f"1/{round(ratio)} of the period of {whole}"
                 return f" That is {part}: a harmonic of the same cause."
     return ""
+
+
+def _part_there(findings: Findings, number: int) -> float:
+    """The part of the held-out recording's force that is a finding's, root mean square."""
+    problem, selection = findings.examined_in(number)
+    return verification.part(selection.last, problem.held, selection.term_index(number))
+
+
+def unconfirmed(part: float) -> str:
+    """Why the held-out recording cannot confirm a finding that has a `part` of the force there."""
+    return ELSEWHERE if f"{part:.2%}" == "0.00%" else FAINT.format(part)
 
 
 def _told_with(findings: Findings, number: int, extent: Extent) -> str:
