@@ -10,7 +10,7 @@ from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from ..units import spell
-from . import parameters as spelled, verification
+from . import parameters as spelled, rivals, verification
 from .acceptance import OF_BASE
 from .baseline import Baseline
 from .common_factor import FACTOR, factor_of
@@ -72,8 +72,9 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             parameters = spanning(parameters, findings, number)
         parameters = parameters | _dates(effect, findings, number)
         parameters = parameters | _derived(effect, parameters, extent, evidence)
-        rivals = *selected.rivals, *map(spoken, selected.instead)
-        text = sentence(effect.name, parameters, share, rivals, extent, together)
+        names = _rivals(findings, number, together)
+        alike = *names, *map(spoken, selected.instead)
+        text = sentence(effect.name, parameters, share, alike, extent, together)
         text += _overtone(effect, parameters, result)
         text += _told_with(findings, number, extent)
         if rest:
@@ -87,12 +88,20 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             text += f" {NO_POSITION}"
         result.append(
             Finding(
-                effect.name, effect.equation, text, selected.rivals, effect.separate_by, parameters,
+                effect.name, effect.equation, text, names, effect.separate_by, parameters,
                 share, held, selected.p_value, confirmed=selected.confirmed,
                 instead=_instead(selected),
             )
         )  # fmt: skip
     return result, [share for share, _ in every]
+
+
+def _rivals(findings: Findings, number: int, together: float | None) -> tuple[str, ...]:
+    """What a finding cannot be told from: not what stands beside it, unless they overlap."""
+    problem, selection = findings.examined_in(number)
+    own = selection.selected[number]
+    told = rivals.beside(problem, selection, number) if together is None and own.near else ()
+    return tuple(name for name in own.rivals if name not in told)
 
 
 def _instead(selected: SelectedTerm) -> dict[str, tuple[str, ...]]:
