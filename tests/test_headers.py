@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxfric.data import io
-from jaxfric.data.columns import assign, unknown_units
+from jaxfric.data.columns import assign, units, unknown_units
 from jaxfric.data.roles import describe, other_unit, stated_unit
 from jaxfric.online.feed import Feed
 
@@ -91,10 +91,23 @@ def test_a_unit_keeps_its_capitals_and_stands_beside_remarks(name, role, unit):
         ("linear_encoder_mm", "position", "mm"), ("torque.mNm", "force", "mN·m"),
         ("motor.current.mA", "force", "mA"), ("axis.A", None, None),
         ("torque (motor) [kNm]", "force", "kN·m"),
+        ("loadcell_force_N", "force", "N"), ("Load cell force [kN]", "force", "kN"),
+        ("iq_torque_Nm", "force", "N·m"), ("i_q_current [A]", "force", "A"),
+        ("enc_pos_mm", "position", "mm"), ("elapsed_time_ms", "time", "ms"),
+        ("x_force", None, None), ("current_position", None, None), ("load_force", None, None),
+        ("Fz", "force", None), ("Fx [kN]", "force", "kN"), ("FY_N", "force", "N"),
+        ("n [rpm]", "velocity", "rpm"), ("n_ist [1/min]", "velocity", "rpm"),
+        ("n_rad_s", "velocity", "rad/s"), ("n", None, None), ("n [mm]", None, None),
+        ("n [m/s]", None, None), ("n_N", None, None),
     ],
 )  # fmt: skip
 def test_more_headers_are_known(name, role, unit):
     assert describe(name) == (role, unit)
+
+
+def test_a_torque_current_is_a_current():
+    for name, unit in (("torque_current", "A"), ("iq_torque", "N·m"), ("current_torque", "N·m")):
+        assert units({"force": name}, {}, {})["force"] == unit
 
 
 RISING = np.arange(5) * 0.004
@@ -115,7 +128,7 @@ FLAT = np.zeros(5)
         ({"Sample": RISING, "other": RISING, "x": FLAT, "f": FLAT}, {}, "time=NAME", "--rate"),
         ({"t": RISING, "x": FLAT, "a_kN": FLAT, "b_kN": FLAT}, {}, "force=NAME", "a_kN"),
         ({"t": RISING, "carriage_mm": FLAT, "F_cmd [kN]": FLAT}, {},
-         "'force=F_cmd [kN],position=carriage_mm'", "is the commanded force"),
+         "position=carriage_mm", "'carriage_mm' is the only one"),
         ({"t": RISING, "f": FLAT, "status_in": FLAT}, {}, "position=NAME", "status_in"),
     ],
 )  # fmt: skip

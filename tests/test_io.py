@@ -339,10 +339,111 @@ def test_a_measured_signal_goes_before_its_estimate():
     assert assign(["t", "q", "tau_est"], None, "log")["force"] == "tau_est"
 
 
-def test_a_commanded_force_is_named_where_none_is_measured():
-    with pytest.raises(ValueError, match="no column is recognised as force") as caught:
-        assign(["Time[ms]", "Feedback Speed[min-1]", "Torque Reference[%]"], None, "log")
-    assert "--columns 'force=Torque Reference[%]'" in str(caught.value)
+@pytest.mark.parametrize(
+    "name", ["Torque Reference[%]", "cmd_force", "F_cmd [kN]", "F_soll_N", "torque_cmd_Nm"]
+)
+def test_a_commanded_force_is_read_where_none_is_measured_and_told(tmp_path, name):
+    names = ["Time[ms]", "Feedback Speed[min-1]", name]
+    assert assign(names, None, "log")["force"] == name
+    assert assign([*names, "tau"], None, "log")["force"] == "tau"
+    path = save(
+        tmp_path / "log.csv", {"t": log()["time"], "x": log()["position"], name: np.ones(200)}
+    )
+    (said,) = io.read_with_notes(path)[1]
+    assert said.startswith(f"No force is measured: {name!r}, the commanded one")
+    assert io.read_with_notes(path, columns={"force": name})[1] == []
+
+
+@pytest.mark.parametrize("others", [["force_cmd", "tau_cmd"], ["F_cmd [kN]", "cell_kN"]])
+def test_a_commanded_force_beside_another_is_not_guessed(others):
+    with pytest.raises(ValueError, match="no column is recognised as force"):
+        assign(["t", "x", *others], None, "log")
+
+
+def test_a_force_of_one_direction_is_the_force_where_it_is_the_only_one():
+    assert assign(["t", "z", "Fz"], None, "log")["force"] == "Fz"
+    assert assign(["t", "z", "Fz", "F"], None, "log")["force"] == "F"
+    with pytest.raises(ValueError, match="3 columns could be the force: Fx, Fy, Fz"):
+        assign(["t", "z", "Fx", "Fy", "Fz"], None, "log")
+
+
+def test_counts_are_the_position_beside_those_of_a_revolution(tmp_path):
+    whole = log()
+    counts = np.rint(1000 * whole["position"])
+    named = {"time": whole["time"], "counts": counts, "I [mA]": whole["force"]}
+    path = save(tmp_path / "log.csv", named)
+    with pytest.raises(ValueError, match="--columns position=counts"):
+        io.read(path)
+    recording = io.read(path, counts_per_rev=1000)
+    np.testing.assert_allclose(recording.position, 2 * np.pi / 1000 * counts)
+    assert recording.unit_names["position"] == "rad"
+
+
+@pytest.mark.parametrize(
+    "other", [{"ticks": np.arange(200)[::-1]}, {"counts": np.arange(200)}], ids=["two", "of rows"]
+)
+def test_counts_that_may_be_another_thing_are_not_guessed(tmp_path, other):
+    whole = log()
+    named = {"time": whole["time"], "counts": np.rint(whole["position"]), "f": whole["force"]}
+    path = save(tmp_path / "log.csv", named | other)
+    with pytest.raises(ValueError, match="no column is recognised as position"):
+        io.read(path, counts_per_rev=1000)
+
+
+STAMPS = {
+    "T": (lambda text: text, ","),
+    "blank": (lambda text: text.replace("T", " "), ","),
+    "comma": (lambda text: text.replace(".", ","), ";"),
+    "quoted": (lambda text: f'"{text.replace(".", ",")}"', ","),
+    "Z": (lambda text: f"{text}Z", ","),
+    "zone": (lambda text: f"{text}+01:00", "\t"),
+    "apart": (lambda text: f"{text.replace('T', ' ')} -0530", ","),
+}
+
+
+def dated(stamp, delimiter=",", repeated=None):
+    """Lines of a log over midnight, every 5 ms, with a row in which a header is `repeated`."""
+    whole, start = log(), np.datetime64("2026-03-04T23:59:59.500", "ms")
+    head = delimiter.join(["Timestamp", "Position [mm]", "Force [N]"])
+    lines = [
+        delimiter.join([stamp(str(start + np.timedelta64(5 * i, "ms"))), f"{x:.4f}", f"{f:.4f}"])
+        for i, (x, f) in enumerate(zip(whole["position"], whole["force"], strict=True))
+    ]
+    if repeated:
+        lines.insert(repeated, head)
+    return "\n".join([head, *lines, ""])
+
+
+@pytest.mark.parametrize("form", STAMPS)
+@pytest.mark.parametrize("above", ["", "Drive: M 7\nFirmware: 3\n"])
+def test_dates_of_iso_8601_are_the_clock(tmp_path, form, above):
+    path = tmp_path / "log.csv"
+    path.write_text(above + dated(*STAMPS[form]))
+    np.testing.assert_allclose(io.read(path).time, 0.005 * np.arange(200), atol=1e-9)
+
+
+def test_a_change_of_the_zone_is_no_jump():
+    instants = np.datetime64("2026-03-29T00:59:59.500", "ms") + 5 * np.arange(200)
+    summer = np.arange(200) >= 100
+    local = instants + 3_600_000 * (1 + summer)
+    stamps = [f"{each}+0{1 + later}:00" for each, later in zip(local, summer, strict=True)]
+    recording = io.read(log() | {"time": np.array(stamps, object)})
+    np.testing.assert_allclose(recording.time, 0.005 * np.arange(200), atol=1e-9)
+
+
+def test_what_is_no_date_among_dates_is_told_where_it_stands(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(dated(lambda text: text).replace("T23:59:59.600", "T23.59"))
+    with pytest.raises(ValueError, match=r"row 22, column 'Timestamp'.* is not a date as the"):
+        io.read(path)
+
+
+@pytest.mark.parametrize("stamp", [lambda text: text, lambda text: text[17:].replace("00.", "60.")])
+def test_a_header_that_comes_again_is_told_as_two_recordings(tmp_path, stamp):
+    path = tmp_path / "log.csv"
+    path.write_text(dated(stamp, repeated=150))
+    with pytest.raises(ValueError, match="row 152 is a header again: .*two recordings.* Split it"):
+        io.read(path)
 
 
 def test_a_table_of_predicted_forces_is_no_recording():

@@ -104,6 +104,39 @@ def test_waves_that_nearly_cancel_are_told_neither_by_a_pitch_nor_by_a_bound():
     assert "periodic in position, period 0.3000 m ± " in told
 
 
+@pytest.mark.parametrize("unit", ["A", "N", "mN·m"])
+@pytest.mark.parametrize(
+    ("saturation", "peak", "part"),
+    [
+        (1.0, 15.09, "71%"),
+        (1.0, 7.5, "45%"),
+        (0.1, 7.5, "49%"),
+        (1.0, 150.9, ""),
+        (1.0, math.nan, ""),
+    ],
+)
+def test_the_level_of_gradual_saturation_is_told_as_extrapolated(unit, saturation, peak, part):
+    values = {
+        "saturation": estimate(saturation, 0.01, "1"),
+        "saturation_level": estimate(15.09, 0.205, unit),
+    }
+    told = sentence("actuator_saturation", values, 0.89, (), Extent(peak=peak))
+    said = f"By this law it would never give more than 15.09 {unit} ± 0.41 {unit}"
+    said += f"; here it gives {part} of that at most, so that the level is not seen" * bool(part)
+    assert f"gradual saturation. {said}; 89% of the unexplained force." in told
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        (0.0, "does not go where it acts"),
+        (0.00172, "it is but 0.17% of the force (root mean square)"),
+    ],
+)
+def test_why_the_held_out_recording_confirms_nothing_is_told(part, said):
+    assert said in reported.unconfirmed(part)
+
+
 def test_a_magnitude_whose_interval_holds_zero_is_no_number():
     values = {"knee": estimate(5.3, 1.6, "N·m"), "saturation": estimate(6.0, 111.0, "1")}
     told = sentence("actuator_saturation", values, 0.73, ())

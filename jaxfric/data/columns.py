@@ -8,12 +8,14 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..units import SI, TORQUES
-from .missing import check_needed, option
+from .missing import check_needed, commanded_force, option
 from .nearest import meant
 from .printable import listed
 from .roles import (
     ESTIMATED,
     MOTION,
+    OF_ONE_DIRECTION,
+    WANTED,
     brackets,
     describe,
     is_remark,
@@ -27,6 +29,8 @@ from .spellings import FITTING, spelt, unit_of
 PREDICTED = ("force", "measured_force", "in_motion")
 # Of the columns that are not used so many are told.
 TOLD = 12
+# Where a signal has another column, one of these words is not it.
+_BESIDE = ESTIMATED | OF_ONE_DIRECTION
 
 
 def served(
@@ -128,7 +132,7 @@ def assign(
         if role and role not in columns and name not in chosen.values():
             candidates.setdefault(role, []).append(name)
     for role, several in candidates.items():
-        found = [name for name in several if not ESTIMATED & set(words_of(name))] or several
+        found = [name for name in several if not _BESIDE & set(words_of(name))] or several
         if role == "force" and set(PREDICTED) <= set(names):
             raise ValueError(
                 f"{source}: jaxfric predict wrote this table of forces, in which no motion is. "
@@ -143,6 +147,8 @@ def assign(
         chosen[role] = found[0]
     if set_point and "time" in chosen and {"reference", "position", "force"} & set(chosen):
         return chosen
+    if "force" not in {*chosen, *columns} and (told := commanded_force(chosen, names)):
+        chosen["force"] = told
     check_needed(chosen, names, columns, source, motion, values)
     return chosen
 
@@ -157,6 +163,23 @@ def _find(names: list[str], name: str, role: str, source: str) -> str:
         f"{source}: there is no column {name!r} for the {role}.{meant(name, names)} The columns "
         f"are: {listed(names)}."
     )
+
+
+def commanded(chosen: Mapping[str, str], given: Mapping[str, str | None] | None) -> list[str]:
+    """A sentence where the force that is read is the commanded one, which the user has not
+    `given`.
+    """
+    name = chosen.get("force", "")
+    if "force" in (given or {}) or not WANTED & set(words_of(name)):
+        return []
+    return [
+        f"No force is measured: {name!r}, the commanded one, is taken for it, which will do where "
+        "the drive gives what it is told."
+    ]
+
+
+# What a force of that name is in unless a unit is stated.
+_OF_WORD = {"torque": "N·m", "current": "A"}
 
 
 def units(
@@ -174,8 +197,9 @@ def units(
         position = velocity.removesuffix("/s") if velocity.endswith("/s") else None
     named = "force" in chosen and scale.get("force") is None  # a set-point may come without
     words = words_of(chosen["force"]) if named else []
-    if force is None:
-        force = "N·m" if "torque" in words else "A" if "current" in words else None
+    if force is None:  # a torque current is a current
+        said = [_OF_WORD[word] for word in words if word in _OF_WORD]
+        force = said[-1] if said else None
     if force:
         found["force"] = force
     if position is None and (given.get("force") or force) in TORQUES:

@@ -27,7 +27,7 @@ _COMMA = r"[-+]?(?:\d+,\d*|,\d+)" + _EXPONENT
 _SEVERAL = r"[-+]?\d{1,3}(?:(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,})"
 # Groups of three digits, as commas separate thousands; all others with a comma have decimals.
 _DECIMAL = r"[-+]?(?:0\d*,\d*|\d{4,},\d*|\d*,(?:\d{0,2}|\d{4,}))" + _EXPONENT
-_NO_NUMBER = {"", "na", "n/a", "#n/a", "null", "none", "-", "nan(ind)", "-nan(ind)"}
+NO_NUMBER = {"", "nan", "nat", "na", "n/a", "#n/a", "null", "none", "-", "nan(ind)", "-nan(ind)"}
 
 
 class Table(NamedTuple):
@@ -263,13 +263,24 @@ def numbers(column: np.ndarray, name: str, path: Path, first_row: int) -> np.nda
     for i, cell in enumerate(column):
         text = "" if cell is None else str(cell).strip()
         try:
-            result[i] = np.nan if text.lower() in _NO_NUMBER else float(text)
+            result[i] = np.nan if text.lower() in NO_NUMBER else float(text)
         except ValueError:
-            raise ValueError(
-                f"{path}: row {first_row + i}, column {short(name)!r}: {short(text)!r} is not a "
-                "number. Correct the cell, or name another column with --columns."
-            ) from None
+            raise ValueError(no_number(text, "number", name, path, first_row + i)) from None
     return result
+
+
+def no_number(text: str, what: str, name: str, path: Path, row: int) -> str:
+    """What to say of a cell that is not `what` its column holds; the header again, or a text."""
+    if row > 2 and text and name.partition(" [")[0] == text.partition(" [")[0]:
+        return (
+            f"{path}: row {row} is a header again: the file holds two recordings, one after the "
+            "other. Split it before that row into two files, and name both, or the one that is "
+            "meant."
+        )
+    return (
+        f"{path}: row {row}, column {short(name)!r}: {short(text)!r} is not a {what}. Correct the "
+        "cell, or name another column with --columns."
+    )
 
 
 def _joined(batches: Iterable[Any], most: int) -> dict[str, np.ndarray]:

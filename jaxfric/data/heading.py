@@ -6,6 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from .iso import is_moment
 from .spellings import is_unit
 
 DELIMITERS = ",;\t|"
@@ -45,7 +46,7 @@ def dialect(lines: list[str], path: Path) -> Dialect:
     rows = rows[above:]
     notes = (f"{above} line{'s' * (above > 1)} above the table left out.",) if above else ()
     cells = split(lines[rows[0]], delimiter)
-    if all(map(_is_number, cells)):
+    if all(map(_is_value, cells)):
         comment = lines[rows[0] - 1].lstrip("# ") if rows[0] else ""
         header, first = split(comment, delimiter), rows[0]
         if len(header) != len(cells):
@@ -71,7 +72,7 @@ def _above(lines: list[str], rows: list[int]) -> tuple[int, str | None]:
         delimiter = _delimiter(lines[below])
         cells, numbers = split(lines[row], delimiter), split(lines[below], delimiter)
         if len(cells) == len(numbers) > 1 and _is_row(numbers):
-            if any(map(_is_number, cells)):
+            if any(map(_is_value, cells)):
                 return 0, delimiter
             named = k and _are_units(cells, len(split(lines[rows[k - 1]], delimiter)))
             return (k - 1 if named else k), delimiter
@@ -79,7 +80,7 @@ def _above(lines: list[str], rows: list[int]) -> tuple[int, str | None]:
 
 
 def _is_row(cells: list[str]) -> bool:
-    return _is_number(cells[0]) and all(_is_number(cell) for cell in cells if cell)
+    return _is_value(cells[0]) and all(_is_value(cell) for cell in cells if cell)
 
 
 def _are_units(cells: list[str], count: int) -> bool:
@@ -96,7 +97,7 @@ def _delimiter(line: str) -> str | None:
 
     def numbers(delimiter: str | None) -> tuple[float, int]:
         cells = [cell for cell in split(line, delimiter) if cell]
-        share = sum(map(_is_number, cells)) / max(len(cells), 1)
+        share = sum(map(_is_value, cells)) / max(len(cells), 1)
         return share, line.count(delimiter) if delimiter else 0
 
     return max([*(each for each in DELIMITERS if each in line), None], key=numbers)
@@ -110,6 +111,11 @@ def split(line: str, delimiter: str | None) -> list[str]:
     with suppress(csv.Error):
         return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
     return [cell.strip() for cell in line.split(delimiter)]
+
+
+def _is_value(text: str) -> bool:
+    """Whether a cell is a number or a date, as of a sample."""
+    return _is_number(text) or is_moment(text)
 
 
 def _is_number(text: str) -> bool:

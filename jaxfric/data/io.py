@@ -22,7 +22,7 @@ from .recording import Recording
 from .roles import stated_unit
 from .spellings import unit_of
 from .tables import IN_MEMORY, in_memory, load
-from .turns import angles
+from .turns import angles, counted
 from .writing import (
     write_bytes as write_bytes,
     write_table as write_table,
@@ -127,6 +127,8 @@ def read_with_notes(
     if rate is not None:
         table = clocked(table, rate, columns, source)
         columns = dict(columns or {}) | {"time": CLOCK}
+    if counts_per_rev is not None:
+        columns = counted(table.columns, columns)
     chosen = names.assign(table.columns, columns, source, set_point, along is None)
     if still := along is not None and not names.MOTION & set(chosen):
         scale = {role: factor for role, factor in scale.items() if role not in names.MOTION}
@@ -137,10 +139,11 @@ def read_with_notes(
         scale, units = angles(chosen, scale, units, counts_per_rev, source)
     implied, units = per_second(chosen, scale, units, source)
     named = names.units(chosen, scale, units)
-    time, counted, in_seconds = _time(table, chosen, scale, path)
+    time, told, in_seconds = _time(table, chosen, scale, path)
     scale = {r: f for r, f in implied.items() if r != "time" or not in_seconds} | scale
     notes = [names.served(chosen, scale, named, own)] if served else []
-    notes += table.notes + names.unknown_units(chosen, scale, given) + counted
+    notes += table.notes + names.unknown_units(chosen, scale, given) + told
+    notes += names.commanded(chosen, columns)
     signals = {
         role: numbers(table.columns[name], name, path, table.first_row)
         for role, name in chosen.items()
@@ -208,7 +211,8 @@ def _check_arguments(chosen, scale, units, period, source) -> None:
 def _time(table: Table, chosen, scale, path: Path) -> tuple[np.ndarray, list[str], bool]:
     """The time column, what is said of it, and whether it is in s whatever its name says."""
     column, notes = table.columns[chosen["time"]], list[str]()
-    if (dated := stamps.moments(column)) is not None:
+    dated = stamps.moments(column, chosen["time"], path, table.first_row)
+    if dated is not None:
         return dated, notes, True
     known = False
     if "time" not in scale:  # a factor is the user's own word

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from .printable import listed
-from .roles import MOTION, WANTED, role_of_words, stated_unit, words_of
+from .roles import MOTION, WANTED, describe, stated_unit, words_of
 
 # Words of what is in a signal's unit and not the signal.
 _BESIDE = WANTED | frozenset(
@@ -48,8 +48,7 @@ def _likely(
     missing: list[str], chosen: Mapping[str, str], names: list[str], values: Mapping[str, Any]
 ) -> tuple[dict[str, str], str]:
     """The one column of each missing role that can be meant, and why."""
-    taken = {name for role, name in chosen.items() if role != "load"}  # a load may be the force
-    free = [name for name in names if name not in taken and not _BESIDE & set(words_of(name))]
+    free = _free(chosen, names)
     found, reasons = {}, ""
     for role in missing:
         fitting = [name for name in free if _states(name, role)]
@@ -58,12 +57,6 @@ def _likely(
         if len(fitting) == 1:
             found[role] = fitting[0]
             reasons += f" {fitting[0]!r} is the only one in a unit of {role}."
-        elif role == "force" and len(told := _commanded(names)) == 1:
-            found[role] = told[0]
-            reasons += (
-                f" {told[0]!r} is the commanded force; where the drive gives what it is told, that "
-                "will do."
-            )
     if "time" in missing and "time" not in found:
         others = [name for name in free if name in values and name not in found.values()]
         rising = {n: step for n in others if (step := _rise(values[n])) is not None}
@@ -74,6 +67,12 @@ def _likely(
                 "the time, if that is in s; if in ms, add --scale time=0.001."
             )
     return found, reasons
+
+
+def _free(chosen: Mapping[str, str], names: Iterable[str]) -> list[str]:
+    """The columns that may be a signal without a column."""
+    taken = {name for role, name in chosen.items() if role != "load"}  # a load may be the force
+    return [name for name in names if name not in taken and not _BESIDE & set(words_of(name))]
 
 
 def _states(name: str, role: str) -> bool:
@@ -98,12 +97,13 @@ def option(columns: Mapping[str, str | None]) -> str:
     return value if '"' not in value and bare.isidentifier() else shlex.quote(value)
 
 
-def _commanded(names: Iterable[str]) -> list[str]:
-    """The columns that hold the commanded force."""
-    found = []
+def commanded_force(chosen: Mapping[str, str], names: Iterable[str]) -> str | None:
+    """The one column of a commanded force, where no other can be the force by its unit."""
+    names, found = list(names), []
     for name in names:
         words = words_of(name)
         rest = [word for word in words if word not in WANTED]
-        if len(rest) < len(words) and role_of_words(rest) == "force":
+        if len(rest) < len(words) and describe("_".join(rest))[0] == "force":
             found.append(name)
-    return found
+    measured = any(_states(name, "force") for name in _free(chosen, names))
+    return found[0] if len(found) == 1 and not measured else None

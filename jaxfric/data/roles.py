@@ -4,8 +4,10 @@ Nothing is guessed: a name is a usual synonym of one role, or is left alone.
 """
 
 import re
+from collections.abc import Callable
+from functools import partial
 
-from ..units import TORQUES
+from ..units import TORQUES, TURNS
 from . import makers
 from .languages import PARTICLES, english, plain
 from .spellings import FITTING, apart, other_prefix, unit_of
@@ -24,7 +26,7 @@ _SYNONYMS = {
     "velocity": "velocity vel velo v qd dq qdot q_dot qvel xd dx xdot x_dot speed omega "
     "angularvelocity angularspeed thetadot dtheta rpm",
     "force": "force torque tau current u vir effort moment thrust f i iq i_q qaxiscurrent "
-    "controleffort loadcell",
+    "controleffort loadcell fx fy fz",
     "reference": "reference ref qg qref xref qdes xdes rposition",
     "load": "load payload loadmass normalload externalload",
     "temperature": "temperature temp",
@@ -33,6 +35,11 @@ _SYNONYMS = {
 }
 MOTION = frozenset({"position", "velocity"})
 _ROLE_OF = {word: role for role, words in _SYNONYMS.items() for word in words.split()}
+# One direction of a force: where another force is recorded, it is beside that one.
+OF_ONE_DIRECTION = frozenset({"fx", "fy", "fz"})
+# Letters that stand for a signal wherever they are in one of its units: M, T, and the speed n.
+_ROTATION = {f"{angle}/{per}" for angle in TURNS for per in ("s", "min")} | {"rpm", "krpm"}
+_LETTERS = {"m": ("force", TORQUES), "t": ("force", TORQUES), "n": ("velocity", _ROTATION)}
 MEASURED = frozenset(
     "measured meas actual act active feedback fb estimate estimated est value motor joint axis "
     "drive actuator cylinder piston".split()
@@ -102,22 +109,37 @@ def role_of_words(words: list[str]) -> str | None:
         rest = [word for word in words if word not in WANTED]
         return "reference" if rest and role_of_words(rest) == "position" else None
     kept = [word for word in words if word not in MEASURED]
-    return _plain_role(kept) if len(kept) < len(words) else None
+    return (_plain_role(kept) if len(kept) < len(words) else None) or _said_twice(kept)
+
+
+def _said_twice(words: list[str]) -> str | None:
+    """The role that each part of a name stands for: `loadcell_force`, `iq_torque`.
+
+    A letter may number axes (`x_force`), and a unit is none of the words (`time_sec`).
+    """
+    for end in range(1, len(words)):
+        role = _plain_role(words[:end])
+        parts = "_".join(words[:end]), "_".join(words[end:])
+        if role is None or any(len(part) < 2 or unit_of(part, role) for part in parts):
+            continue
+        if role in (_plain_role(words[end:]), _said_twice(words[end:])):
+            return role
+    return None
 
 
 def describe(name: str) -> tuple[str | None, str | None]:
     """The role that a column's name stands for and the unit that it states, each or `None`."""
     cased, words = _cased(name), words_of(name)
-    if _is_torque(words) and (unit := _bracketed(name, "force")) in TORQUES:
-        return "force", unit
+    if found := _by_letter(words, lambda role: _bracketed(name, role)):
+        return found
     if (role := role_of_words(words)) is not None:
         return role, _bracketed(name, role) or ("rpm" if words[-1:] == ["rpm"] else None)
     for tail in (1, 2, 3):
         if len(words) <= tail:
             break
         stated = "_".join(cased[-tail:])
-        if _is_torque(words[:-tail]) and (unit := unit_of(stated, "force")) in TORQUES:
-            return "force", unit
+        if found := _by_letter(words[:-tail], partial(unit_of, stated)):
+            return found
         role = role_of_words(words[:-tail])
         unit = unit_of(stated, role) if role else None
         # `position_in` is rather an input than in inches.
@@ -126,9 +148,11 @@ def describe(name: str) -> tuple[str | None, str | None]:
     return None, None
 
 
-def _is_torque(words: list[str]) -> bool:
-    """Whether a name is a letter that stands for a torque wherever its unit is one: M, T."""
-    return [word for word in words if word not in MEASURED] in (["m"], ["t"])
+def _by_letter(words: list[str], unit_as: Callable[[str], str | None]) -> tuple[str, str] | None:
+    """The role and the unit of a name that is one letter, where its unit is one of that signal."""
+    role, units = _LETTERS.get("".join(word for word in words if word not in MEASURED), (None, ()))
+    unit = unit_as(role) if role else None
+    return (role, unit) if unit in units else None
 
 
 def stated_unit(name: str, role: str) -> str | None:

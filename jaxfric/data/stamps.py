@@ -1,8 +1,12 @@
 """A time column in seconds: dates, and counts since 1970 in seconds down to nanoseconds."""
 
-from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
+
+from .delimited import NO_NUMBER, no_number
+from .iso import is_moment, moment
+from .printable import short
 
 # From 1980 to 2100 in seconds since 1970: a factor of 13, so that stamps of such dates in s, ms,
 # µs and ns are told by their size alone.
@@ -13,14 +17,42 @@ _LARGEST_EXACT = 2**53  # whole numbers beyond this lose digits as float64
 SLOW = 0.5
 
 
-def moments(column: np.ndarray) -> np.ndarray | None:
-    """Dates with a time of day as seconds from the first one; `None` if they are none."""
-    if column.dtype.kind == "O" and len(column) and "-" in str(column[0])[1:]:
-        with suppress(ValueError):
-            column = np.array([str(cell).strip().removesuffix("Z") for cell in column], "M8[ns]")
+def moments(column: np.ndarray, name: str, path: Path, first_row: int) -> np.ndarray | None:
+    """Dates with a time of day as seconds from the first one, `(N,)`; `None` if they are none.
+
+    Empty cells become NaN.
+
+    **Raises:** `ValueError` naming the file, row, column and value of the first cell that is no
+    date where others are.
+    """
+    if column.dtype.kind in "OU" and is_moment(_first(column)):
+        column = _dates(column, name, path, first_row)
     if column.dtype.kind != "M":
         return None
-    return (column - column[0]) / np.timedelta64(1, "s")
+    known = column[~np.isnat(column)]
+    return (column - known[0]) / np.timedelta64(1, "s") if len(known) else None
+
+
+def _first(column: np.ndarray) -> str:
+    """The first cell with a value, as a text."""
+    texts = ("" if cell is None else str(cell).strip() for cell in column)
+    return next((text for text in texts if text.lower() not in NO_NUMBER), "")
+
+
+def _dates(column: np.ndarray, name: str, path: Path, first_row: int) -> np.ndarray:
+    """Cells as moments, by universal time where they say how far they are from it."""
+    texts, ahead = [], np.zeros(len(column), "m8[m]")
+    for i, cell in enumerate(column):
+        text = "" if cell is None else str(cell).strip()
+        found = moment(text)
+        if found is None and text.lower() not in NO_NUMBER:
+            raise ValueError(no_number(text, "date as the others", name, path, first_row + i))
+        each, ahead[i] = found or ("NaT", 0)
+        texts.append(each)
+    try:
+        return np.array(texts, "M8[ns]") - ahead
+    except ValueError as error:  # a thirteenth month
+        raise ValueError(f"{path}: column {short(name)!r}: {error}. Correct the cell.") from None
 
 
 def since_1970(column: np.ndarray, notes: list[str]) -> np.ndarray:

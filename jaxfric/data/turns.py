@@ -2,9 +2,37 @@
 
 import math
 from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
 
 from ..units import TURNS
-from .roles import stated_unit
+from .roles import MEASURED, describe, stated_unit, words_of
+from .spellings import unit_of
+
+
+def counted(
+    table: Mapping[str, Any], columns: Mapping[str, str | None] | None
+) -> dict[str, str | None]:
+    """The `columns` that the user names and, where none is a position, the one of `table` that is
+    called by its unit alone, `counts` or `motor_ticks`, and does not merely number the rows.
+    """
+    given = dict(columns or {})
+    if "position" in given or any(describe(name)[0] == "position" for name in table):
+        return given
+    found = [name for name in table if name not in given.values() and _is_counts(name)]
+    found = [name for name in found if not _numbers_rows(table[name])]
+    return given | {"position": found[0]} if len(found) == 1 else given
+
+
+def _is_counts(name: str) -> bool:
+    words = [word for word in words_of(name) if word not in MEASURED]
+    return unit_of("_".join(words), "position") == "counts"
+
+
+def _numbers_rows(column: Any) -> bool:
+    column = np.asarray(column)
+    return column.dtype.kind in "iuf" and bool(np.all(np.diff(column.astype(np.float64)) == 1))
 
 
 def angles(

@@ -4,8 +4,6 @@ Nothing is searched again and nothing exchanged: a finding that does not bring t
 the held-out recording is reported as not confirmed, and the model does without it.
 """
 
-import numpy as np
-
 from ..data.recording import Recording
 from . import parameters as spelled, verification
 from .acceptance import LINEARITY
@@ -14,7 +12,6 @@ from .figures import Figures
 from .findings import Findings, Solution
 from .improvement import Improved, errors_of_base, force_errors
 from .motion import Motion
-from .predictions import with_predictions
 from .problem import with_holdout
 from .selection import Selection
 from .slow_changes import slow, stroke_of
@@ -170,10 +167,9 @@ def _acts_there(findings: Findings, number: int) -> bool:
     An end stop has none in a motion that does not reach it, a limit none where less is asked for.
     """
     problem, selection = findings.examined_in(number)
-    last, index = selection.last, selection.term_index(number)
-    seen = with_predictions(problem.held, last)
-    force = seen.columns(last.terms[index], last.betas[index][None])[0] @ last.alphas[index]
-    return bool(np.linalg.norm(force) >= LINEARITY * np.linalg.norm(seen.force))
+    return (
+        verification.part(selection.last, problem.held, selection.term_index(number)) >= LINEARITY
+    )
 
 
 def _nil(findings: Findings) -> list[bool]:

@@ -85,10 +85,12 @@ def _one(model: Model, findings: Findings, beside: _Beside, most: int) -> Findin
     best = accepted(round_, given, evidence, problem.other_rows, given, [])
     if best is None:
         return None
-    best, rivals, others = with_rivals(simplest(best, round_), round_, given, evidence)
+    best, rivals = with_rivals(simplest(best, round_), round_, given, evidence)
     last, _ = joined(best, selection.base, evidence)
     trial = with_own_term(best.trial, last)
-    term = SelectedTerm(trial, (*rivals, MISMATCH), best.p_value, instead=others)
+    term = SelectedTerm(
+        trial, (*rivals.names, MISMATCH), best.p_value, instead=rivals.instead, near=rivals.near
+    )
     base, last = (as_given(model, each, problem.evidence) for each in (selection.base, last))
     found = selection._replace(base=base, last=last, selected=[term], given=model, trusted=True)
     return alone(Solution(problem, found))

@@ -10,7 +10,7 @@ from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH, PARAMETER_MISMATCH
 from ..units import spell
-from . import parameters as spelled, verification
+from . import parameters as spelled, rivals, verification
 from .acceptance import OF_BASE
 from .baseline import Baseline
 from .common_factor import FACTOR, factor_of
@@ -34,6 +34,10 @@ NO_POSITION = (
     "recording the position tells."
 )
 ELSEWHERE = " The held-out recording does not go where it acts, and cannot confirm it."
+FAINT = (
+    " On the held-out recording it is but {0:.2%} of the force (root mean square), too little to "
+    "confirm it."
+)
 REST = (
     " Its size is not known together with its shape, and it is little beside the other findings: "
     "it may be what those have not quite the shape of."
@@ -68,8 +72,9 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             parameters = spanning(parameters, findings, number)
         parameters = parameters | _dates(effect, findings, number)
         parameters = parameters | _derived(effect, parameters, extent, evidence)
-        rivals = *selected.rivals, *map(spoken, selected.instead)
-        text = sentence(effect.name, parameters, share, rivals, extent, together)
+        names = _rivals(findings, number, together)
+        alike = *names, *map(spoken, selected.instead)
+        text = sentence(effect.name, parameters, share, alike, extent, together)
         text += _overtone(effect, parameters, result)
         text += _told_with(findings, number, extent)
         if rest:
@@ -78,17 +83,25 @@ def reported(findings: Findings, first: Fit) -> tuple[list[Finding], list[float]
             text += REPHASED
         unheard = selected.confirmed is None and not effect.momentary
         if findings.problem.held is not None and unheard:
-            text += ELSEWHERE
+            text += unconfirmed(_part_there(findings, number))
         if effect.late and not evidence.located:
             text += f" {NO_POSITION}"
         result.append(
             Finding(
-                effect.name, effect.equation, text, selected.rivals, effect.separate_by, parameters,
+                effect.name, effect.equation, text, names, effect.separate_by, parameters,
                 share, held, selected.p_value, confirmed=selected.confirmed,
                 instead=_instead(selected),
             )
         )  # fmt: skip
     return result, [share for share, _ in every]
+
+
+def _rivals(findings: Findings, number: int, together: float | None) -> tuple[str, ...]:
+    """What a finding cannot be told from: not what stands beside it, unless they overlap."""
+    problem, selection = findings.examined_in(number)
+    own = selection.selected[number]
+    told = rivals.beside(problem, selection, number) if together is None and own.near else ()
+    return tuple(name for name in own.rivals if name not in told)
 
 
 def _instead(selected: SelectedTerm) -> dict[str, tuple[str, ...]]:
@@ -227,6 +240,17 @@ def _overtone(effect: Effect, parameters: dict[str, Estimate], before: list[Find
     return ""
 
 
+def _part_there(findings: Findings, number: int) -> float:
+    """The part of the held-out recording's force that is a finding's, root mean square."""
+    problem, selection = findings.examined_in(number)
+    return verification.part(selection.last, problem.held, selection.term_index(number))
+
+
+def unconfirmed(part: float) -> str:
+    """Why the held-out recording cannot confirm a finding that has a `part` of the force there."""
+    return ELSEWHERE if f"{part:.2%}" == "0.00%" else FAINT.format(part)
+
+
 def _told_with(findings: Findings, number: int, extent: Extent) -> str:
     """That the values along the stroke are those of several findings together, in words."""
     _, selection = findings.examined_in(number)
@@ -273,11 +297,13 @@ def _without(findings: Findings, numbers: list[int]) -> Findings:
 
 
 def _extent(evidence: Evidence, base: Mapping[str, Estimate]) -> Extent:
-    """The range of the position, the usual force, and the inertia by the `base`'s parameters."""
+    """The range of the position, the usual force and the largest, and the inertia by the `base`'s
+    parameters.
+    """
     limits = evidence.limits
     force = float(np.sqrt(np.mean(evidence.force**2)))
     inertia = float(base["inertia"].value) if "inertia" in base else float("nan")
-    return Extent(float(limits.low), float(limits.high), force, inertia)
+    return Extent(float(limits.low), float(limits.high), force, inertia, float(limits.peak))
 
 
 def _derived(

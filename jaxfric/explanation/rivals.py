@@ -1,10 +1,14 @@
 """Which of several candidates that fit alike is selected, and which cannot be told from it."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from .predictions import with_predictions
+from .problem import Problem
 from .regression import Fit
+from .selection import Selection
 from .significance import LEVEL
 from .trials import RIVAL, Contest, Finalist
 
@@ -34,10 +38,22 @@ def simplest(best: Finalist, round_: Contest) -> Finalist:
 ALIKE, TOLD = 0.95, 4.0
 
 
+class Rivals(NamedTuple):
+    """What cannot be told from the winner of a round.
+
+    `names` of effects, `instead`: of its own effect the parameters; `near`: those that only do as
+    well, with another force.
+    """
+
+    names: tuple[str, ...]
+    instead: tuple[str, ...]
+    near: tuple[Finalist, ...]
+
+
 def with_rivals(
     best: Finalist, round_: Contest, current: Fit, evidence, besides: Sequence[Finalist] = ()
-) -> tuple[Finalist, tuple[str, ...], tuple[str, ...]]:
-    """The best, the effects that cannot be told from it, and of its own effect the parameters.
+) -> tuple[Finalist, Rivals]:
+    """The best, and what cannot be told from it.
 
     `besides`: finalists that cannot be selected, though they may fit as well.
 
@@ -46,15 +62,13 @@ def with_rivals(
     """
     basis, force = current.basis(), _force(best, evidence)
     force = force - basis @ (basis.T @ force)
-    alike = []
+    alike, near = [], []
     for other in [*round_.finalists, *besides]:
         if other.effect.name == best.effect.name and not _of_another(other, best):
             continue
         theirs = _force(other, evidence)
         theirs = theirs - basis @ (basis.T @ theirs)
-        size = np.linalg.norm(force) * np.linalg.norm(theirs)
-        same = size > 0 and abs(force @ theirs) > ALIKE * size
-        same = same and other.energy <= TOLD * best.energy
+        same = _same(force, theirs) and other.energy <= TOLD * best.energy
         # The remainder of a term that is but the first order of its effect is no evidence, neither
         # against significant effects that it is known to be confused with nor against itself.
         effect, rival = best.effect, other.effect
@@ -64,6 +78,7 @@ def with_rivals(
         significant = other.p_value <= LEVEL and half
         if same or other.score > best.score - RIVAL or (excused and significant):
             alike.append((other, same))
+            near += [other] * (not same and not excused)
     own = best.effect.name
     names = [f.effect.name for f, _ in alike if f.effect.name != own]
     instead = [_parameter(f) for f, _ in alike if f.effect.name == own]
@@ -71,7 +86,40 @@ def with_rivals(
     if _line(best, "time") and twin and twin[0].p_value <= LEVEL:
         best = twin[0]
         names = [own, *(name for name in names if name != best.effect.name)]
-    return best, tuple(dict.fromkeys(names)), tuple(dict.fromkeys(instead))
+    every, others = dict.fromkeys(names), dict.fromkeys(instead)
+    return best, Rivals(tuple(every), tuple(others), tuple(near))
+
+
+def beside(problem: Problem, selection: Selection, number: int) -> set[str]:
+    """The rivals of a selected term that stand beside it in the model.
+
+    One that did as well with another force, and is that force there, has been told from it: the
+    model needs both.
+    """
+    own = selection.selected[number]
+    evidence, last = with_predictions(problem.evidence, selection.last), selection.last
+    basis = selection.base.basis()
+    there: dict[str, list[np.ndarray]] = {}
+    for n, each in enumerate(selection.selected):
+        if n != number and each.effect.name in own.rivals:
+            i = selection.term_index(n)
+            force = evidence.columns(last.terms[i], last.betas[i][None])[0] @ last.alphas[i]
+            there.setdefault(each.effect.name, []).append(force - basis @ (basis.T @ force))
+    forces: dict[str, list[np.ndarray]] = {}
+    for finalist in own.near:
+        if finalist.effect.name in there:
+            force = _force(finalist, evidence)
+            forces.setdefault(finalist.effect.name, []).append(force - basis @ (basis.T @ force))
+    return {
+        name
+        for name, theirs in forces.items()
+        if all(any(_same(force, other) for other in there[name]) for force in theirs)
+    }
+
+
+def _same(force: np.ndarray, other: np.ndarray) -> bool:
+    size = np.linalg.norm(force) * np.linalg.norm(other)
+    return bool(size > 0 and abs(force @ other) > ALIKE * size)
 
 
 def _selectable(finalist: Finalist, round_: Contest) -> bool:

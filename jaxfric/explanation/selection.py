@@ -10,12 +10,13 @@ from ..models import Model
 from ..terms.effect import Effect
 from .motion import Motion
 from .regression import Fit
-from .trials import Contest, Trial
+from .trials import Contest, Finalist, Trial
 
 
 class SelectedTerm(NamedTuple):
     """A term that was selected, the effects that it may be as well, and its p-value.
 
+    `near`: of those effects the ones that only did as well, with another force, as they competed;
     `rephased`: whether on the held-out recording its waves only fit with another phase;
     `confirmed`: whether that recording confirms it, `None` where it cannot say; `instead`: other
     parameters that may have changed, where the effect is the change of one.
@@ -27,6 +28,7 @@ class SelectedTerm(NamedTuple):
     rephased: bool = False
     confirmed: bool | None = None
     instead: tuple[str, ...] = ()
+    near: tuple[Finalist, ...] = ()
 
     @property
     def effect(self) -> Effect:

@@ -89,7 +89,7 @@ def select(
         if own.best is None or len(selected) >= MOST_TERMS or names in visited:
             break
         visited.add(names)
-        best, rivals, instead = with_rivals(
+        best, rivals = with_rivals(
             simplest(own.best, own.contest), own.contest, own.current, own.evidence, own.spoiling
         )
         betas = (*best.betas[: len(current.betas)], best.betas[-1])
@@ -99,7 +99,8 @@ def select(
             continue
         current, evidence = with_it, seen
         trial = with_own_term(best.trial, current)
-        selected = [*selected, SelectedTerm(trial, rivals, best.p_value, instead=instead)]
+        term = SelectedTerm(trial, rivals.names, best.p_value)
+        selected = [*selected, term._replace(instead=rivals.instead, near=rivals.near)]
         current, evidence, selected = _pruned(evidence, current, selected, round_.contest.size)
         for number in nil(current, len(selected), evidence, problem.wide):
             nothing.add(selected[number].form)

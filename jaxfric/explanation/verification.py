@@ -156,6 +156,16 @@ def share(
     return float(np.sum(rest**2) - np.sum(right**2)) / power
 
 
+def part(current: Fit, evidence: Evidence, number: int) -> float:
+    """The force of the term of that number on another recording, in parts of all force there, both
+    root mean square.
+    """
+    seen = with_predictions(evidence, current)
+    columns = seen.columns(current.terms[number], current.betas[number][None])[0]
+    force = columns @ current.alphas[number]
+    return float(np.linalg.norm(force)) / max(float(np.linalg.norm(seen.force)), 1e-300)
+
+
 def nearer(more: np.ndarray, less: np.ndarray) -> bool:
     """Whether the residual of `more` is smaller than that of `less`, N, both `(J,)`.
 

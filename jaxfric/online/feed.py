@@ -126,7 +126,7 @@ class Feed:
         chosen, scale = names.assign(header, columns, source), dict(scale or {})
         implied, named = per_second(chosen, scale, units or {}, source)
         self.units = names.units(chosen, scale, named)
-        doubts = names.unknown_units(chosen, scale, units)
+        doubts = names.unknown_units(chosen, scale, units) + names.commanded(chosen, columns)
         scale = implied | scale
         self.served = " ".join([names.served(chosen, scale, self.units, header), *doubts])
         self._source, self._width = source, len(header)

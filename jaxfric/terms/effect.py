@@ -85,13 +85,15 @@ class Extent(NamedTuple):
     """Magnitudes of a recording that a sentence is measured by.
 
     `low` and `high`: the range of the position, m; `force`: root mean square, N; `inertia` of the
-    axis by the model, kg, not a number where it has none.
+    axis by the model, kg, not a number where it has none; `peak`: the largest force of either
+    sign, N.
     """
 
     low: float = 0.0
     high: float = float("inf")
     force: float = float("nan")
     inertia: float = float("nan")
+    peak: float = float("nan")
 
     @property
     def stroke(self) -> float:

@@ -1,14 +1,16 @@
 """Gain that falls at high force."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ...units import DIMENSIONLESS, FORCE
 from ..actuator import PREDICTED
 from ..base import AbstractLaw
-from ..effect import Effect, with_parameter
+from ..effect import Effect, Extent
 from ..sample import UNKNOWN, Parameter, Sample
 from ..table import reading
 from ..text import literal
@@ -75,6 +77,28 @@ class SoftSaturation(AbstractLaw):
         return (f"f * (1.0 / {s.raised(f'1.0 - {used}', '0.5')} - 1.0)",)
 
 
+def _reached(saturation: float, most: float) -> float:
+    """The largest f/L that the soft law gives where `most` is the largest u/L, from 0 to 1."""
+    given = np.linspace(0.0, 1.0, 1001)[:-1]
+    asked = given * (1 + saturation * (1 / np.sqrt(1 - given**2) - 1))
+    return float(np.interp(most, asked, given))
+
+
+def _gradual(values: Mapping[str, float], extent: Extent) -> str | None:
+    """The sentence of the soft law, whose level is not seen but extrapolated."""
+    level = values.get("saturation_level")
+    if level is None:
+        return None
+    text = (
+        "The actuator gives less than commanded, the more the larger the force: gradual "
+        "saturation. By this law it would never give more than {saturation_level}"
+    )
+    reached = _reached(values["saturation"], extent.peak / level)
+    if not reached < _NEAR:  # as far as the law goes
+        return text
+    return f"{text}; here it gives {reached:.0%} of that at most, so that the level is not seen"
+
+
 ACTUATOR_SATURATION = Effect(
     "actuator_saturation",
     "c max(abs(f) − U, 0) sign(f), or c f (1/√(1 − (f/L)²) − 1)",
@@ -87,9 +111,5 @@ ACTUATOR_SATURATION = Effect(
     confusable_with=("gain_asymmetry", "load_dependent_friction"),
     separate_by="Repeat at half the acceleration, below the knee.",
     positive=True,
-    variant=with_parameter(
-        "saturation_level",
-        "The actuator gives less than commanded, the more the larger the force, and never more "
-        "than {saturation_level}: gradual saturation",
-    ),
+    variant=_gradual,
 )
