@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
-from jaxfric.explanation import structure
+from jaxfric.explanation import acceptance, structure
 from jaxfric.explanation.locate import Structure
+from jaxfric.explanation.motion import motion_of
+from jaxfric.explanation.problem import problem_of
 
 
 def controlled(seed: int, bits: int, rates, ways, duration: float):
@@ -58,3 +60,62 @@ def test_structure_that_is_no_more_than_noise_is_no_reason_for_a_verdict():
     assert structure.that_matter([small], current, 2.0, 0.3) == [small]
     # What answers the counts is larger than the one and smaller than the other.
     assert structure.that_matter([small, large], current, 2.0, 0.5) == [large]
+
+
+def test_a_law_that_is_smaller_where_the_velocity_is_smoothed_over_less_is_of_smoothing(
+    monkeypatch,
+):
+    """Of a motion through a wide polynomial and a narrow one: what is two thirds as much goes."""
+    shares = {"as large": 1.0, "two thirds": 0.66, "a fifth": 0.2}
+
+    def alike(finalist, current, rows, factor, least):
+        return 1 / factor < shares[rows] < factor
+
+    monkeypatch.setattr(acceptance, "_alike", alike)
+    assert not acceptance.of_smoothing(None, None, None)
+    assert not acceptance.of_smoothing(None, None, "as large")
+    assert acceptance.of_smoothing(None, None, "two thirds")
+    assert acceptance.of_smoothing(None, None, "a fifth")
+
+
+def test_rows_are_rougher_where_the_velocity_is_smoothed_over_more_than_the_kernel():
+    coarse, fine = (
+        controlled(1, 8, (0.2, 0.7), (6, 1.3), 20.0),
+        controlled(1, 18, (0.2, 0.7), (6, 1.3), 20.0),
+    )
+    model = jf.models.named("coulomb-viscous")
+    rows = problem_of(coarse, model)
+    assert rows.rougher is not None and rows.rougher.width == rows.evidence.width
+    assert motion_of(coarse).polynomial > rows.evidence.width
+    assert problem_of(fine, model).rougher is None
+
+
+def jogged(seed: int, bits: int):
+    """A motor under a PI speed loop that answers its counts, jogged at many speeds."""
+    draw, cycle, parts = np.random.default_rng(seed), 1e-3, 4
+    speeds = np.concatenate([np.full(700, v) for v in draw.uniform(-11, 11, 40)])
+    asked = np.convolve(speeds, np.ones(120) / 120, "same")
+    count, inertia = 2 * np.pi / 2**bits, 4e-3
+    place = rate = filtered = last = total = 0.0
+    force, seen = np.empty(len(asked)), np.empty(len(asked))
+    for i in range(len(asked)):
+        counted = count * np.floor(place / count + 0.5)
+        filtered += 0.05 * ((counted - last) / cycle - filtered)
+        last = seen[i] = counted
+        total += 1.5 * (asked[i] - filtered) * cycle
+        u = force[i] = 0.1 * (asked[i] - filtered) + total
+        for _ in range(parts):
+            free = rate + cycle / parts * (u - 0.004 * rate) / inertia
+            rate = np.sign(free) * max(abs(free) - cycle / parts * 0.08 / inertia, 0.0)
+            place += cycle / parts * rate
+    time = np.arange(len(asked)) * cycle
+    noise = 0.005 * np.sqrt(np.mean(force**2)) * draw.normal(size=len(time))
+    return jf.Recording(time, np.round(force + noise, 5), np.round(seen, 4))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("bits", [8, 9])
+def test_what_smoothing_takes_off_a_coarse_velocity_is_no_load_on_a_spring(bits):
+    """It was a compliance "at a frequency that this recording cannot tell"."""
+    found = jf.explain(jogged(1, bits), "coulomb-viscous", jogged(2, bits))
+    assert found.verdict == "consistent" and not found.findings

@@ -104,3 +104,15 @@ def test_how_far_an_encoder_is_off_follows_from_the_inertia():
     }
     assert "the inertia seems to vary by 0.0580 kg" in told(effect, parameters)
     assert isinstance(effect.shapes(None)[0], terms.EncoderError)
+
+
+@pytest.mark.slow
+def test_an_encoder_of_a_motor_that_turns_many_times_is_told():
+    """Sixty revolutions: of a period that is a small part of the stroke it is told, since the
+    position is an angle; it was an unbalance of "8.4 ± 3.8 mN·m".
+    """
+    turning = 2e-4, 0.02, 3e-3, 380.0, ("N·m", "rad")
+    answer = found(turning, off=(0.006, 2 * np.pi))
+    (finding,) = answer.findings
+    assert finding.effect == "encoder_error" and answer.verdict == "explained"
+    assert float(finding.parameters["encoder_error"].value) == pytest.approx(0.006, rel=0.02)

@@ -495,3 +495,13 @@ def test_a_result_is_told_with_what_each_file_contradicts_itself_in():
     ]
     assert "warning force_late: 5 recordings: e, f, g and 2 more" in told
     assert "warning x: 1 recording: j" in told
+
+
+def test_too_few_recordings_of_an_axis_for_a_drift_are_told():
+    many, rows = rows_like([10.0, 12.0, 14.0] * 4, axes=4)
+    found = fleet.compare(many, rows)
+    assert found.most == 3 and not found.drifts
+    assert telling._drifts(found) == [
+        "", "Drift: no axis has more than 3 sound recordings, and it takes 4."
+    ]  # fmt: skip
+    assert telling._drifts(fleet.compare(*rows_like([10.0, 10.0, 99.0]))) in ([], [""])

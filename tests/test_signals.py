@@ -508,3 +508,17 @@ def test_a_shift_by_a_sample_does_not_turn_the_choice_of_a_width(seed):
         return signals.choose(jf.Recording(time, 0 * time, velocity=velocity), velocity).half_width
 
     assert len({width(shift) for shift in range(8)}) == 1
+
+
+@pytest.mark.parametrize(("decimals", "known"), [(6, True), (4, True), (2, False)])
+def test_counts_are_known_behind_the_decimals_of_a_log(decimals, known):
+    """512 counts a revolution in radians: 0.01227, of which two decimals leave other steps."""
+    count, time = 2 * np.pi / 512, np.arange(20000) / 1000
+    angle = np.round(count * np.round(3 * np.sin(2 * time) / count), decimals)
+    assert signals.count_of(angle) == pytest.approx(count if known else 0.01, rel=1e-3)
+
+
+def test_a_position_that_is_measured_has_no_counts():
+    noise = np.random.default_rng(0).normal(size=20000)
+    angle = 3 * np.sin(2 * np.arange(20000) / 1000) + 1e-3 * noise
+    assert signals.count_of(angle) == 0.0
