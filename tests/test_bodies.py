@@ -8,7 +8,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import cli
-from jaxfric.explanation import agreement, fewest_numbers
+from jaxfric.explanation import agreement, agreement_text, fewest_numbers
 from jaxfric.explanation.acceptance import LINEARITY
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
@@ -421,7 +421,7 @@ def test_values_of_several_bodies_raise_a_doubt_about_the_geometry():
     estimate = Estimate(np.float64(2.5), np.float64(0.01), "kg")
 
     def said(*names):
-        return agreement._geometry({name: Moved(2.0, estimate) for name in names}, robot)
+        return agreement_text.geometry({name: Moved(2.0, estimate) for name in names}, robot)
 
     assert said(FORE + "mass", FORE + "centre_x", "option/gravity/x") == []
     (doubt,) = said(FORE + "mass", "body/upper/mass")
