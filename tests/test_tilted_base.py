@@ -159,7 +159,7 @@ def test_a_tilt_beside_an_armature_is_all_that_is_told(tmp_path, capsys):
     for row in rows:
         for finding in row["explanation"]["findings"]:
             assert finding["effect"] == "parameter_mismatch"
-            values |= {name: own["value"] for name, own in finding["parameters"].items()}
+            values |= {name: own["to"] for name, own in finding["parameters"].items()}
     gravity = {f"option/gravity/{letter}": g for letter, g in zip("xyz", TILTED, strict=True)}
     assert values.keys() == gravity.keys() | {"joint/yaw/armature"}
     assert values.pop("joint/yaw/armature") == pytest.approx(0.50, abs=0.003)

@@ -85,7 +85,7 @@ def find_each(parts: Sequence[Part]) -> list[FaultSearch]:
         return []
     seen = find(parts)
     if not seen.faults.clock and len(parts) > 1:
-        own = [find([part]).faults for part in parts]
+        own = [find([part], zeros=False).faults for part in parts]
         own = [each if each.clock and not each.zeros else Faults() for each in own]
         if any(each.clock for each in own):
             on_time = [
@@ -106,15 +106,19 @@ def _with_clock(seen: FaultSearch, number: int, own: Faults) -> FaultSearch:
     return seen._replace(faults=faults, rows=[seen.rows[number]], alone=own.clock)
 
 
-def find(parts: Sequence[Part]) -> FaultSearch:
-    """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
+def find(parts: Sequence[Part], zeros: bool = True) -> FaultSearch:
+    """The zeros and clocks of a comparison; nothing where something else accounts for as much.
+
+    `zeros`: whether they are wanted, which takes a second search by gravity where there are some.
+    """
     recorded = [_rows(part) for part in parts]
-    seen = _found(parts, recorded, Faults())
+    found = _found if zeros else _searched
+    seen = found(parts, recorded, Faults())
     late = _shift(recorded)
     if not late:
         return seen
     # The shift knows of few values: of a spring, say, it makes a clock.
-    shifted = _found(parts, recorded, Faults(late=late))
+    shifted = found(parts, recorded, Faults(late=late))
     enough = min(HALVED * seen.left, LEAVES)
     return shifted if shifted.faults.clock and shifted.left < enough else seen
 
