@@ -121,7 +121,7 @@ def _answered(
     """
     rows = _rows(told, bodies)
     first = told, rows, answer(rows, apart)
-    if not _by_gravity(first[2]):
+    if not rows.turned(first[2].values):
         return first
     bare = [each._replace(needless=missing(each.explanation.model)) for each in told]
     if not any(each.needless for each in bare):
@@ -138,11 +138,8 @@ def _answered(
         bare, plain = some, _rows(some, bodies)
         found = answer(plain, apart)
     fewer = len(found.values) <= len(first[2].values) + gone
-    return (bare, plain, found) if gone and fewer and _by_gravity(found) else first
-
-
-def _by_gravity(found: Answer) -> bool:
-    return not found.values.keys().isdisjoint(GRAVITY)
+    tilted = plain.turned(found.values)
+    return (bare, plain, found) if gone and fewer and tilted else first
 
 
 def _impossible(moved: Mapping[str, Moved], rows: Bodies) -> bool:
