@@ -8,7 +8,7 @@ import pytest
 
 import jaxfric as jf
 from jaxfric import cli
-from jaxfric.explanation import agreement, fewest_numbers
+from jaxfric.explanation import agreement, agreement_text, fewest_numbers
 from jaxfric.explanation.acceptance import LINEARITY
 from jaxfric.explanation.bodies import Bodies
 from jaxfric.explanation.fewest_numbers import answer
@@ -322,6 +322,26 @@ def test_an_inertia_is_one_that_a_body_can_have():
     assert inertia[1] == pytest.approx(0.02) and inertia[0] + inertia[2] >= inertia[1]
 
 
+def test_an_inertia_that_has_to_go_along_counts_as_a_number():
+    """A hinge's armature and its body's inertia are one to it: the one that stands alone."""
+    robot = rows(arm(), arm())
+    assert robot.raised({FORE + "inertia_y": 0.010}) == []
+    ((body, axis, before, after), *more) = robot.raised({FORE + "inertia_y": 0.029})
+    assert (body, axis, before) == ("fore", "x", 0.002) and after > before and len(more) == 1
+    changed = [
+        fewest_numbers._changed(robot, state, ())
+        for state in ({FORE + "inertia_y": 0.029}, {"elbow:joint/elbow/armature": 0.02})
+    ]
+    assert changed[0] > changed[1]
+
+
+def test_other_bodies_would_leave_less_only_beyond_noise():
+    noisy = rows(arm(), arm(mass="1.7"), correlated=40)
+    assert answer(noisy, {"upper", "fore"}).short == ()
+    loaded = rows(arm(), arm(load=LOAD))
+    assert "elbow" in fewest_numbers._short(loaded, {FORE + "mass": 1.7})
+
+
 def test_a_mass_alone_is_one_number_of_the_file():
     done = patched(mujoco, arm(), {FORE + "mass_alone": 1.7})
     changed = set(done.text.splitlines()) - set(arm().splitlines())
@@ -421,7 +441,7 @@ def test_values_of_several_bodies_raise_a_doubt_about_the_geometry():
     estimate = Estimate(np.float64(2.5), np.float64(0.01), "kg")
 
     def said(*names):
-        return agreement._geometry({name: Moved(2.0, estimate) for name in names}, robot)
+        return agreement_text.geometry({name: Moved(2.0, estimate) for name in names}, robot)
 
     assert said(FORE + "mass", FORE + "centre_x", "option/gravity/x") == []
     (doubt,) = said(FORE + "mass", "body/upper/mass")

@@ -13,36 +13,35 @@ from ..data.printable import listed_and
 from ..data.recording import Recording
 from ..identification.uncertainty import Estimate
 from ..models import Model
-from ..simulators import Attribute, Mujoco
-from ..simulators.columns import GAIN
-from ..simulators.weights import GRAVITY, MASS, attribute, weights
+from ..simulators import Mujoco
+from ..simulators.weights import GRAVITY, weights
+from ..terms.base import AbstractTerm
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from . import parameters as spelled
 from .acceptance import LINEARITY
-from .attributes import CONSTANT, claimed, listed
+from .agreement_text import GEOMETRY, worded
+from .attributes import claimed
 from .bodies import Bodies, State
 from .explained import Explanation
-from .fewest_numbers import answer
+from .fewest_numbers import Answer, answer
 from .finding import Finding, Moved
-from .joint_rows import joint_rows
-from .quantities import quantity
+from .joint_rows import joint_rows, missing, needless
 from .sanity.preceding import p_value, with_preceding
 
-# A base is set up to a tenth of a degree.
-STRAIGHT = 0.1
 # Gravity at the poles, and at the equator five kilometres up, m/s².
 EARTH = 9.765, 9.833
 
 
 class Told(NamedTuple):
     """One joint: its simulator as given, its recordings (the one explained, and the held-out one if
-    there is one), and its own explanation.
+    there is one), and its own explanation; `needless`, terms of that which gravity accounts for.
     """
 
     simulator: Mujoco
     logs: Sequence[Recording]
     explanation: Explanation
+    needless: Sequence[AbstractTerm] = ()
 
 
 class Agreement(NamedTuple):
@@ -85,10 +84,9 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     simulator = told[0].simulator
     bodies = weights(simulator.mujoco, simulator.model)
     with jax.enable_x64(True):
-        rows = _rows(told, bodies)
+        told, rows, found = _answered(told, bodies, apart)
         others = [(_rows(told, bodies, wide=2), spelled.with_smoothing),
                   (_rows(told, bodies, held=True), spelled.with_elsewhere)]  # fmt: skip
-        found = answer(rows, apart)
         state, moved = found.values, _moved(rows, others, found.values)
         while unsure := {name for name, m in moved.items() if m.may_be_none}:
             rest = {name: value for name, value in state.items() if name not in unsure}
@@ -99,7 +97,8 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     known = {name: m.estimate for name, m in moved.items()}
     if rows.turned(values):
         moved[rows.down] = _down(rows, values, known)
-    text = _text(moved, found.instead, rows, told)
+    own = {each.simulator.joint: each.simulator.attributes() for each in told}
+    text = worded(moved, found.instead, rows, own)
     if moved and found.short:
         text += (
             f"; that is not all: of joint {listed_and(found.short)} other bodies would leave less"
@@ -108,6 +107,39 @@ def agreed(told: Sequence[Told], apart: Collection[str] = ()) -> Agreement:
     if impossible:
         text += f"; gravity is of that size nowhere: something else is wrong, as {GEOMETRY}"
     return Agreement(moved, text, found.instead, impossible)
+
+
+def _answered(
+    told: Sequence[Told], bodies, apart: Collection[str]
+) -> tuple[Sequence[Told], Bodies, Answer]:
+    """The rows of all joints and what they say, beside the missing physics that is needed then.
+
+    Without gravity of another direction a joint finds a spring, an unbalance or worse in what that
+    does to it. In the span of these is what tells a centre of mass from an armature. So where
+    gravity is in the answer, it is asked for again without them: all are needless that take nothing
+    beside it, if it takes no more numbers than one for each of them.
+    """
+    rows = _rows(told, bodies)
+    first = told, rows, answer(rows, apart)
+    if not rows.turned(first[2].values):
+        return first
+    bare = [each._replace(needless=missing(each.explanation.model)) for each in told]
+    if not any(each.needless for each in bare):
+        return first
+    plain = _rows(bare, bodies)
+    found = answer(plain, apart)
+    shift = plain.shift(found.values)
+    some = [
+        each._replace(needless=needless(own, each.explanation.model, shift[plain.at(k)]))
+        for k, (each, own) in enumerate(zip(bare, plain.joints, strict=True))
+    ]
+    gone = sum(len(each.needless) for each in some)
+    if gone < sum(len(each.needless) for each in bare):
+        bare, plain = some, _rows(some, bodies)
+        found = answer(plain, apart)
+    fewer = len(found.values) <= len(first[2].values) + gone
+    tilted = plain.turned(found.values)
+    return (bare, plain, found) if gone and fewer and tilted else first
 
 
 def _impossible(moved: Mapping[str, Moved], rows: Bodies) -> bool:
@@ -163,7 +195,10 @@ def _rows(told: Sequence[Told], bodies, wide: int = 1, held: bool = False) -> Bo
         delay = each.explanation.fit["filtered_force_error"]["force_taken_later"]
         log = each.logs[held]
         try:
-            found.append(joint_rows(each.simulator, log, model, delay, LINEARITY, wide))
+            own = joint_rows(
+                each.simulator, log, model, delay, LINEARITY, wide, needless=each.needless
+            )
+            found.append(own)
         except ValueError:
             if not held and wide == 1:
                 raise
@@ -226,97 +261,3 @@ def _held_out_share(found: Explanation, first: Explanation) -> float | None:
 def _confirmed(found: Explanation, first: Explanation) -> bool | None:
     share = _held_out_share(found, first)
     return None if share is None else share > 0
-
-
-def _text(
-    moved: Mapping[str, Moved], instead: Mapping[str, tuple[str, ...]], rows: Bodies,
-    told: Sequence[Told],
-) -> str:  # fmt: skip
-    """The wrong values in words, each with what would do as well."""
-    own = {each.simulator.joint: each.simulator.attributes() for each in told}
-    texts = []
-    for name, m in moved.items():
-        said = quantity(m.estimate, smaller=False)
-        text = f"{_value(name, rows)} {m.before:.4g} → {said}"
-        if others := instead.get(name):
-            alike = dict.fromkeys(_said(other, rows, own) for other in others)
-            text += f" (or {listed(list(alike), 'others')}: these motions cannot tell them apart)"
-        texts.append(text)
-    return "; ".join(
-        [*texts, *_turned(moved, rows), *_raised(moved, rows), *_geometry(moved, rows)]
-    )
-
-
-def _value(name: str, rows: Bodies) -> str:
-    """A value of a body or of gravity in words."""
-    if name in GRAVITY:
-        return f"gravity along {name[-1]}"
-    body, what = rows.owner[name]
-    value = attribute(rows.weights[body], body, what)
-    return f"{value.owner}: {value.what}"
-
-
-def _turned(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
-    """By how much gravity has another direction than in the file, as of a base that is askew."""
-    if not any(name in moved for name in GRAVITY):
-        return []
-    before = np.array([rows.before[name] for name in GRAVITY])
-    after = np.array([moved[n].value if n in moved else rows.before[n] for n in GRAVITY], float)
-    sizes = np.linalg.norm(before), np.linalg.norm(after)
-    if not all(sizes):
-        return []
-    angle = np.degrees(np.arctan2(np.linalg.norm(np.cross(before, after)), before @ after))
-    text = f"gravity is {sizes[1]:.4g} m/s²"
-    if angle < STRAIGHT:
-        return [f"{text} and of the same direction"]
-    how = "is tilted" if angle < 45 else "is mounted another way"
-    return [f"{text} and {angle:.3g}° from the file's direction: the base {how}"]
-
-
-def _said(name: str, rows: Bodies, own: Mapping[str, Mapping[str, Attribute]]) -> str:
-    """A number that would do as well, in words."""
-    if name in GRAVITY:
-        return _value(name, rows)
-    if name in rows.owner:
-        body, what = rows.owner[name]
-        return str(attribute(rows.weights[body], body, what))
-    joint, _, key = name.partition(":")
-    if key == CONSTANT or key not in own[joint]:
-        return f"a constant force at joint {joint}"
-    return (
-        f"gain of joint {joint}"
-        if key == GAIN and own[joint][key].what == GAIN
-        else str(own[joint][key])
-    )
-
-
-# What no value of a body or of gravity stands for.
-GEOMETRY = (
-    "the file's geometry (lengths of links, axes, couplings of joints), which is not among what is "
-    "asked"
-)
-
-
-def _geometry(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
-    """A doubt where values of several bodies differ: a part that is bolted on changes one."""
-    bodies = dict.fromkeys(rows.owner[name][0] for name in moved if name in rows.owner)
-    if len(bodies) < 2:
-        return []
-    return [f"these are values of {len(bodies)} bodies at once: look first at {GEOMETRY}"]
-
-
-def _raised(moved: Mapping[str, Moved], rows: Bodies) -> list[str]:
-    """The inertias that go along because no body could be without."""
-    texts = []
-    for body, weight in rows.weights.items():
-        own: State = {rows.owner[n][1]: float(m.value) for n, m in moved.items()
-                      if n in rows.owner and rows.owner[n][0] == body}  # fmt: skip
-        new = weight.with_values(own)
-        times = new.mass / weight.mass if MASS in own else 1.0
-        for letter, i, before in zip("xyz", new.inertia, weight.inertia, strict=True):
-            if f"inertia_{letter}" not in own and i > before * times * (1 + 1e-9):
-                texts.append(
-                    f"body {body}: inertia {letter} {before:.4g} → {i:.4g} kg·m², the least that a "
-                    "body with the others can have: these motions do not show it"
-                )
-    return texts

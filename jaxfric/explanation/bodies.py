@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from ..identification.uncertainty import Estimate
 from ..simulators.rigid import PARAMETERS
-from ..simulators.weights import GRAVITY, PULLED, Weight, attribute
+from ..simulators.weights import GRAVITY, MASS, PULLED, Weight, attribute
 from .intervals import spread
 from .joint_rows import JointRows
 from .regression import Fit
@@ -58,7 +58,7 @@ class Bodies:
         self.powers = np.array([joint.target @ joint.target for joint in joints])
         self.enough = np.array([joint.enough for joint in joints])
         for k, joint in enumerate(joints):
-            at = self._at(k)
+            at = self.at(k)
             self.grams[k][np.ix_(at, at)] = joint.columns.T @ joint.columns
             self.pulls[k][at] = joint.columns.T @ joint.target
         self.gram, self.pull = self.grams.sum(axis=0), self.pulls.sum(axis=0)
@@ -70,7 +70,7 @@ class Bodies:
         every[linear] = np.linalg.lstsq(scaled, self.pull[linear] / size, rcond=1e-12)[0] / size
         self.least = self._energies(every)
 
-    def _at(self, number: int) -> list[int]:
+    def at(self, number: int) -> list[int]:
         """Where the columns of a joint stand among those of all."""
         first = sum(len(joint.own) for joint in self.joints[:number])
         own = list(range(first, first + len(self.joints[number].own)))
@@ -143,6 +143,20 @@ class Bodies:
         owned = ((self.owner[n], v) for n, v in state.items() if n in self.owner)
         own = {what: v for (b, what), v in owned if b == body}
         return self.weights[body].with_values(own, any_)
+
+    def raised(self, state: State) -> list[tuple[str, str, float, float]]:
+        """The inertias that go along in a state because no body could be without: body, axis, and
+        the inertia before and after, kg·m².
+        """
+        found = []
+        for body in dict.fromkeys(self.owner[n][0] for n in state if n in self.owner):
+            before, after = self.weights[body], self.weight(body, state)
+            times = after.mass / before.mass if f"body/{body}/{MASS}" in state else 1.0
+            for letter, old, new in zip("xyz", before.inertia, after.inertia, strict=True):
+                given = f"body/{body}/inertia_{letter}" in state
+                if not given and new > old * times * (1 + 1e-9):
+                    found.append((body, letter, float(old), float(new)))
+        return found
 
     def value(self, name: str, state: State) -> float:
         """A number in a state that may not hold it, as it goes along with the others."""
@@ -235,8 +249,8 @@ class Bodies:
         slopes, shift = self.slopes(names, state), self.shift(state)
         columns, left = [], []
         for k, joint in enumerate(self.joints):
-            columns.append(joint.columns @ slopes[self._at(k)])
-            left.append(joint.target - joint.columns @ shift[self._at(k)])
+            columns.append(joint.columns @ slopes[self.at(k)])
+            left.append(joint.target - joint.columns @ shift[self.at(k)])
         residual, whole = np.concatenate(left), np.concatenate(columns)
         empty = np.zeros((len(whole), 0))
         values = (np.array([self.value(name, state) for name in names]),)

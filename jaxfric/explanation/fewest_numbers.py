@@ -10,6 +10,7 @@ import numpy as np
 from ..identification.uncertainty import Estimate
 from ..simulators.weights import GRAVITY, MASS, MASS_ALONE
 from .bodies import Bodies, State
+from .joint_rows import by_chance
 from .least_squares import orthonormal
 from .mismatch import SURE
 
@@ -46,12 +47,19 @@ def answer(robot: Bodies, apart: Collection[str] = ()) -> Answer:
 
 
 def _short(robot: Bodies, state: State) -> tuple[str, ...]:
-    """Joints of which a state leaves more than all linear parameters do, by more than as many
-    parameters take of noise.
+    """Joints of which a state leaves more than all linear parameters do, by more than noise like
+    that puts into what these can do.
     """
-    most = np.maximum(robot.enough, robot.products)
-    more = robot.energies(state) - robot.least > most
-    return tuple(joint.name for joint, each in zip(robot.joints, more, strict=True) if each)
+    if not state:
+        return ()
+    more, shift, found = robot.energies(state) - robot.least, robot.shift(state), []
+    for k, joint in enumerate(robot.joints):
+        linear = len(joint.own) + robot.products - robot.shared
+        basis = orthonormal(joint.columns[:, :linear])
+        residual = joint.target - joint.columns @ shift[robot.at(k)]
+        if more[k] > max(robot.enough[k], by_chance(basis, residual, joint.block)):
+            found.append(joint.name)
+    return tuple(found)
 
 
 def fewest(robot: Bodies, apart: Collection[str] = ()) -> State:
@@ -160,10 +168,10 @@ def _sure(robot: Bodies, state: State) -> bool:
 
 def _changed(robot: Bodies, state: State, apart: Collection[str]) -> float:
     """By how much a state's numbers differ from the simulator's, a part of each, summed; where a
-    mass takes more than one number of the file, that counts as another one. What a joint's own
-    number or a body's does as well is not gravity.
+    mass takes more than one number of the file, that counts as another one, and so does an inertia
+    that has to go along. What a joint's own number or a body's does as well is not gravity.
     """
-    found = 0.0
+    found = float(len(robot.raised(state)))
     for name, value in state.items():
         if name in robot.place:
             found += 2.0 if name in GRAVITY else 1.0

@@ -1,7 +1,7 @@
 """One joint's log as rows of a regression that several joints share: by what its bodies weigh."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from ..terms import KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import AbstractTerm, summands
 from ..terms.effects import traits
 from .evidence import Evidence, gather
+from .fewest import SURE
 from .figures import cast
 from .least_squares import orthonormal, solve
 from .motion import motion_of
@@ -91,18 +92,18 @@ def opened(
 
 def joint_rows(
     simulator: Mujoco, log: Recording, found: Model, delay: float, linearity: float,
-    wide: int = 1, width: int | None = None,
+    wide: int = 1, width: int | None = None, needless: Collection[AbstractTerm] = (),
 ) -> JointRows:  # fmt: skip
     """The rows of a joint.
 
     **Arguments:** `simulator` as given, `log` `(N,)`; `found`, the model of the joint's own
-    explanation, whose missing physics stands beside; `delay`, s, by which the force is taken later;
-    `linearity` of a sensor of force, relative; `wide`: how many times the usual kernel's width, or
-    how many times `width`, samples in half of it.
+    explanation, whose missing physics stands beside, but for the terms `needless`; `delay`, s, by
+    which the force is taken later; `linearity` of a sensor of force, relative; `wide`: how many
+    times the usual kernel's width, or how many times `width`, samples in half of it.
     """
     evidence, names, own, shared = opened(simulator, log, delay, wide, width)
     columns = np.concatenate([own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
-    basis = physics(found, evidence)
+    basis = physics(found, evidence, among(needless))
     columns = columns - basis @ (basis.T @ columns)
     target = evidence.target - basis @ (basis.T @ evidence.target)
     left = target - columns @ solve(columns, target)
@@ -135,6 +136,56 @@ def physics(
     seen = with_predictions(evidence, _without_known(whole))
     there = fit(whole.only(missing).terms, seen, whole.only(missing).betas, 0)
     return orthonormal(there.jacobian)
+
+
+def among(some: Collection[AbstractTerm]) -> Callable[[AbstractTerm], bool]:
+    """Whether a term is one of some: itself, not another of equal values."""
+    return lambda term: any(term is each for each in some)
+
+
+def missing(found: Model) -> tuple[AbstractTerm, ...]:
+    """The terms of the missing physics that a joint's model holds."""
+    return tuple(term for term in summands(found.term) if _is_physics(term))
+
+
+def needless(rows: JointRows, found: Model, shift: np.ndarray) -> tuple[AbstractTerm, ...]:
+    """The terms of a joint's missing physics that take no more of what other values leave than
+    noise like that puts into them, or than a sensor of force resolves; one after the other.
+
+    **Arguments:** `rows` without any physics in their span; `found`, the joint's model; `shift`
+    `(p + 3 + 22 B,)`: the values, by the rows' columns.
+    """
+    evidence, gone = rows.evidence, tuple[AbstractTerm, ...]()
+    assert evidence is not None
+    residual = rows.target - rows.columns @ shift
+    while True:
+        whole, least = physics(found, evidence, among(gone)), {}
+        for number, term in enumerate(missing(found)):
+            if among(gone)(term):
+                continue
+            rest = physics(found, evidence, among((*gone, term)))
+            lone = orthonormal(whole - rest @ (rest.T @ whole))
+            enough = max(rows.enough, by_chance(lone, residual, rows.block))
+            least[number] = float(np.sum((lone.T @ residual) ** 2)) / max(enough, 1e-300)
+        weakest = min(least, key=lambda number: least[number], default=None)
+        if weakest is None or least[weakest] > 1:
+            return gone
+        gone = (*gone, missing(found)[weakest])
+
+
+def by_chance(basis: np.ndarray, noise: np.ndarray, block: np.ndarray) -> float:
+    """The energy that noise puts into directions at most: its mean and 3.5 standard deviations.
+
+    **Arguments:** orthonormal `basis` `(J, r)`; `noise` `(J,)`, which is correlated within each
+    `block` `(J,)` and not beyond.
+    """
+    count = int(block[-1]) + 1
+    sums = np.array([np.bincount(block, each * noise, count) for each in basis.T])
+    if not len(sums):
+        return 0.0
+    # A quadratic form of normal variables of covariance C: its mean is tr C, its variance 2 tr C².
+    covariance = sums @ sums.T
+    return float(np.trace(covariance) + SURE * np.sqrt(2 * np.sum(covariance**2)))
 
 
 def _is_physics(term) -> bool:

@@ -3,11 +3,12 @@
 A wrong zero z makes the simulator's force f(q − z); a force whose stamps are late by τ is u(t) =
 f(t − τ), of a clock that runs at another rate τ grows with time. To first order each is a column
 like a wrong value. It is believed where the fewest columns that account for the mismatch include
-it, and these leave little.
+it, and these leave little. A zero competes with gravity of another direction, as of a tilted base,
+which it looks like to one joint.
 """
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..acceptance import LINEARITY
 from ..least_squares import orthonormal
 from ..mismatch import MOST_WRONG, fewest
 from ..predictions import rate
+from .changes import Changes, by_gravity, by_zero, differences
 from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
 
 ZERO, OFFSET, DRIFT = "zero/", CLOCK.name, "clock_drift"
@@ -31,10 +33,6 @@ HALVED = 0.5
 ROUNDS, CLOSE = 6, 0.1
 # Further, rad, an angle's sine is no straight line: 5 %.
 FAR = 0.5
-# A step of an angle, rad or m in parts of the motion, for the derivative by the zero.
-STEP = 1e-3
-# Forces are asked of the simulator at so many moments; between them the difference is smooth.
-MOMENTS = 2000
 # Shifts of up to this part of the record are tried.
 FARTHEST = 8
 
@@ -69,6 +67,13 @@ class FaultSearch(NamedTuple):
     left: float = 1.0
     alone: bool = False
 
+    @property
+    def numbers(self) -> int:
+        """How many numbers it takes: zeros, a clock's, and wrong values beside them."""
+        clock = bool(self.faults.late) + bool(self.faults.drift)
+        beside = [name for name in self.chosen if not _is_fault(name)]
+        return len(beside) + len(self.faults.zeros) + clock
+
 
 def find_each(parts: Sequence[Part]) -> list[FaultSearch]:
     """The search of each joint: zeros of all joints, and the clock of the log or of one force.
@@ -80,7 +85,7 @@ def find_each(parts: Sequence[Part]) -> list[FaultSearch]:
         return []
     seen = find(parts)
     if not seen.faults.clock and len(parts) > 1:
-        own = [find([part]).faults for part in parts]
+        own = [find([part], zeros=False).faults for part in parts]
         own = [each if each.clock and not each.zeros else Faults() for each in own]
         if any(each.clock for each in own):
             on_time = [
@@ -101,26 +106,61 @@ def _with_clock(seen: FaultSearch, number: int, own: Faults) -> FaultSearch:
     return seen._replace(faults=faults, rows=[seen.rows[number]], alone=own.clock)
 
 
-def find(parts: Sequence[Part]) -> FaultSearch:
-    """The zeros and clocks of a comparison; nothing where something else accounts for as much."""
+def find(parts: Sequence[Part], zeros: bool = True) -> FaultSearch:
+    """The zeros and clocks of a comparison; nothing where something else accounts for as much.
+
+    `zeros`: whether they are wanted, which takes a second search by gravity where there are some.
+    """
     recorded = [_rows(part) for part in parts]
-    seen = _found(parts, recorded, Faults())
+    found = _found if zeros else _searched
+    seen = found(parts, recorded, Faults())
     late = _shift(recorded)
     if not late:
         return seen
     # The shift knows of few values: of a spring, say, it makes a clock.
-    shifted = _found(parts, recorded, Faults(late=late))
+    shifted = found(parts, recorded, Faults(late=late))
     enough = min(HALVED * seen.left, LEAVES)
     return shifted if shifted.faults.clock and shifted.left < enough else seen
 
 
 def _found(parts: Sequence[Part], recorded: list[Rows], faults: Faults) -> FaultSearch:
+    """Where a search that begins with some faults ends; zeros only where gravity explains no more.
+
+    A joint feels a tilt of its base as a wrong zero, and other values make up for what the others
+    feel of it.
+    """
+    seen = _searched(parts, recorded, faults)
+    if not seen.faults.zeros:
+        return seen
+    other = _searched(parts, recorded, faults, gravity=True)
+    return other if _explains_more(other, seen, recorded) else seen
+
+
+def _explains_more(other: FaultSearch, seen: FaultSearch, recorded: Sequence[Rows]) -> bool:
+    """Whether one search explains more than another: as much by fewer numbers, clearly more by as
+    many, or by more numbers so much more as a clock has to.
+
+    Where both do as well, as of a joint by which all turns, the zero stands.
+    """
+    if len(other.chosen) > MOST_WRONG:
+        return False
+    more = other.numbers - seen.numbers
+    enough = _enough(recorded) / max(_energy(recorded), 1e-300)
+    if more > 0:
+        return other.left < HALVED * seen.left - enough
+    return other.left < seen.left + (enough if more < 0 else -enough)
+
+
+def _searched(
+    parts: Sequence[Part], recorded: list[Rows], faults: Faults, gravity: bool = False
+) -> FaultSearch:
     """Where a search that begins with some faults ends; the rows as `recorded` say what they are
-    better than.
+    better than. `gravity`: whether that is among the values that may be wrong.
     """
     rows, before = _put_right(parts, recorded, faults), _energy(recorded)
     known = {OFFSET} if faults.late else set[str]()
-    stack = _stack(parts, rows, faults)
+    pulls = by_gravity(parts) if gravity else {}
+    stack = _stack(parts, rows, faults, pulls)
     chosen = _chosen(stack, rows)
     for _ in range(ROUNDS):
         new = _new(stack, chosen)
@@ -128,13 +168,13 @@ def _found(parts: Sequence[Part], recorded: list[Rows], faults: Faults) -> Fault
             break
         if not (known := known | new):
             break
-        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen)
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls)
         chosen = _chosen(stack, rows)
     if known:
-        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen)
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls)
     if _energy(rows) > before or not _matters(faults, parts):
         faults, rows = Faults(), recorded
-        stack = _stack(parts, rows, faults)
+        stack = _stack(parts, rows, faults, pulls)
     left = energy(stack, chosen) / max(before, 1e-300)
     beside = [name for name in chosen if not _is_fault(name)]
     names = [n for n in stack.names if _is_fault(n) or n.endswith(": gain")]
@@ -159,20 +199,21 @@ def _new(stack: Stack, chosen: Sequence[str]) -> set[str]:
 
 
 def _refined(
-    parts: Sequence[Part], rows: list[Rows], faults: Faults, names: list[str], chosen
-) -> tuple[Faults, list[Rows], Stack]:
+    parts: Sequence[Part], rows: list[Rows], faults: Faults, names: list[str], chosen,
+    pulls: Changes,
+) -> tuple[Faults, list[Rows], Stack]:  # fmt: skip
     """Some faults fitted beside the other wrong values, by Gauss-Newton."""
     beside = [name for name in chosen if name not in names and not _is_fault(name)]
     # A part of a sample between force and motion is no fault, and no other value's either.
     beside += [OFFSET] * (OFFSET not in names)
-    stack = _stack(parts, rows, faults)
+    stack = _stack(parts, rows, faults, pulls)
     for _ in range(ROUNDS):
         values = estimate(stack, [*beside, *names])
         steps = {name: values[name][0] for name in names}
         faults = _moved(faults, steps)
         faults = faults._replace(errors={name: values[name][1] for name in names})
         rows = _put_right(parts, rows, faults)
-        stack = _stack(parts, rows, faults)
+        stack = _stack(parts, rows, faults, pulls)
         if all(abs(step) < CLOSE * values[name][1] for name, step in steps.items()):
             break
     return faults, rows, stack
@@ -225,7 +266,7 @@ def _put_right(parts: Sequence[Part], before: Sequence[Rows], faults: Faults) ->
         weight = own.weight * np.sqrt(len(own.target) / len(rows.target))
         rows = rows._replace(weight=float(weight))
         if any(faults.zeros.values()) and isinstance(part.simulator, Mujoco):
-            off = rows.evidence.project(_differences(part.simulator, log, faults.zeros)(rows))
+            off = rows.evidence.project(differences(part.simulator, log, faults.zeros)(rows))
             rows = rows._replace(target=rows.target - off, known=rows.known + off)
         found.append(rows)
     return found
@@ -248,12 +289,14 @@ def put_right(recording: Recording, faults: Faults) -> Recording:
     return dataclasses.replace(recording, force=np.asarray(moved).astype(kind), mask=mask)
 
 
-def _stack(parts: Sequence[Part], rows: Sequence[Rows], faults: Faults) -> Stack:
-    """The simulator's own columns first: what they can say as well is theirs."""
+def _stack(parts: Sequence[Part], rows: Sequence[Rows], faults: Faults, pulls: Changes) -> Stack:
+    """The simulator's own columns first: what they can say as well is theirs; then what `pulls`."""
     columns = []
-    changes = _by_zero(parts, faults)
+    changes = by_zero(parts, faults.zeros)
     for part, own in zip(parts, rows, strict=True):
         some = {_shared(name, part.name): own.own[:, i] for i, name in enumerate(own.names)}
+        for name, change in pulls.get(part.name, {}).items():
+            some[name] = own.evidence.project(change(own))
         for joint, change in changes.get(part.name, {}).items():
             some[f"{ZERO}{joint}"] = own.evidence.project(change(own))
         some[OFFSET], some[DRIFT] = -own.rate, -own.elapsed * own.rate
@@ -266,46 +309,16 @@ def _shared(name: str, joint: str) -> str:
     return name if "/" in name else f"{joint}: {name}"
 
 
-Change = Callable[[Rows], np.ndarray]
-
-
-def _by_zero(parts: Sequence[Part], faults: Faults) -> dict[str, dict[str, Change]]:
-    """By joint whose force it is, and by joint whose zero: the force's derivative at the nodes."""
-    found: dict[str, dict[str, Change]] = {}
-    for part in parts:
-        simulator = part.simulator
-        if not isinstance(simulator, Mujoco):
-            continue
-        found[part.name] = {
-            joint: _differences(simulator, part.recording, faults.zeros, joint)
-            for joint in simulator.recorded
-        }
-    return found
-
-
-def _differences(
-    simulator: Mujoco, recording: Recording, zeros: Mapping[str, float], joint: str | None = None
-) -> Change:
-    """The change of the force by all zeros; its derivative by that of one joint."""
-    time = np.asarray(recording.time, float)
-    index = np.arange(0, len(time), max(1, len(time) // MOMENTS))
-    before = dict(zeros) if joint else {}
-    step = STEP if joint else 1.0
-    after = before | {joint: before.get(joint, 0.0) + step} if joint else dict(zeros)
-    first, second = (simulator.moved(recording, each, index) for each in (before, after))
-    change = (second - first) / step
-
-    def at(rows: Rows) -> np.ndarray:
-        return np.interp(nodes(rows), time[index], change)
-
-    return at
-
-
 def _chosen(stack: Stack, rows: Sequence[Rows]) -> tuple[str, ...]:
     """The fewest columns that leave no more than all of them."""
-    force = sum(float(np.sum((r.weight * r.evidence.force) ** 2)) for r in rows)
-    found = fewest(stack.columns, stack.target, stack.block, LINEARITY**2 * force)
+    found = fewest(stack.columns, stack.target, stack.block, _enough(rows))
     return tuple(stack.names[i] for i in found)
+
+
+def _enough(rows: Sequence[Rows]) -> float:
+    """The energy that no sensor of force resolves."""
+    force = sum(float(np.sum((r.weight * r.evidence.force) ** 2)) for r in rows)
+    return LINEARITY**2 * force
 
 
 def _shift(rows: Sequence[Rows]) -> float:

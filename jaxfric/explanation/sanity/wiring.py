@@ -8,7 +8,7 @@ import numpy as np
 from ...simulators import Mujoco
 from ...simulators.loading import is_hinge
 from ...terms import KNOWN_FORCE
-from .faults import MOMENTS
+from .changes import MOMENTS
 from .rows import Part, Rows, nodes
 
 # What leaves most of a force's power does not describe it; half of that is a description.
