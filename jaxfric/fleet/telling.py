@@ -116,7 +116,7 @@ def _outliers(found: Summary) -> list[str]:
 def _drifts(found: Summary) -> list[str]:
     tried = found.tried[1]
     shown = [drift for drift in found.drifts if drift.chance < LEVEL]
-    if found.most and not tried:
+    if found.most > 1 and not tried:
         few = f"no axis has more than {found.most} sound recordings, and it takes {FEWEST_OF_AXIS}."
         return ["", f"Drift: {few}"]
     if not shown:
