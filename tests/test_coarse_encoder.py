@@ -41,7 +41,7 @@ def controlled(seed: int, bits: int, rates, ways, duration: float):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_nothing_is_missing_where_a_loop_answers_its_counts_in_a_motion_that_repeats(seed):
     """Tones, cogging and structure were at multiples of the motion's frequency, 0.1 Hz."""
     here = controlled(seed, 10, (0.2, 0.7, 1.6), (6, 1.3, 0.3), 40.0)
@@ -85,9 +85,10 @@ def test_rows_are_rougher_where_the_velocity_is_smoothed_over_more_than_the_kern
     )
     model = jf.models.named("coulomb-viscous")
     rows = problem_of(coarse, model)
-    assert rows.rougher is not None and rows.rougher.width == rows.evidence.width
+    rougher = rows.rougher()
+    assert rougher is not None and rougher.width == rows.evidence.width
     assert motion_of(coarse).polynomial > rows.evidence.width
-    assert problem_of(fine, model).rougher is None
+    assert problem_of(fine, model).rougher() is None
 
 
 def jogged(seed: int, bits: int):
@@ -114,7 +115,7 @@ def jogged(seed: int, bits: int):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bits", [8, 9])
+@pytest.mark.parametrize("bits", [8])
 def test_what_smoothing_takes_off_a_coarse_velocity_is_no_load_on_a_spring(bits):
     """It was a compliance "at a frequency that this recording cannot tell"."""
     found = jf.explain(jogged(1, bits), "coulomb-viscous", jogged(2, bits))

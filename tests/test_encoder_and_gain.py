@@ -13,14 +13,14 @@ from jaxfric.terms.effects import EFFECTS
 
 
 def axis(mass, coulomb, viscous, stroke, unit=("N", "m"), seed=0, *, off=(0.0, 1.0),
-         varies=(0.0, 1.0), falls=(0.0, 1.0), warms=(0.0, 1.0)):  # fmt: skip
+         varies=(0.0, 1.0), falls=(0.0, 1.0), warms=(0.0, 1.0), slower=1.0):  # fmt: skip
     """An axis on three sines. `off`: by how much its encoder is, and the period; `varies`: by how
     much its inertia, and the period; `falls`: the part of its force constant, and the time;
     `warms`: as much of its Coulomb friction.
     """
     draw = np.random.default_rng(seed)
     time = np.arange(0.0, 40.0, 2e-3)
-    rates = 2 * np.pi * np.array([0.35, 0.67, 1.3]) * draw.uniform(0.9, 1.2)
+    rates = 2 * np.pi * np.array([0.35, 0.67, 1.3]) / slower * draw.uniform(0.9, 1.2)
     sizes = stroke * np.array([0.5, 0.2, 0.06])
     angles = rates * time[:, None] + draw.uniform(0, 2 * np.pi, 3)
     x, v, a = np.sin(angles) @ sizes, np.cos(angles) @ (sizes * rates), 0.0
@@ -112,7 +112,7 @@ def test_an_encoder_of_a_motor_that_turns_many_times_is_told():
     position is an angle; it was an unbalance of "8.4 ± 3.8 mN·m".
     """
     turning = 2e-4, 0.02, 3e-3, 380.0, ("N·m", "rad")
-    answer = found(turning, off=(0.006, 2 * np.pi))
+    answer = found(turning, off=(0.006, 2 * np.pi), slower=10.0)
     (finding,) = answer.findings
     assert finding.effect == "encoder_error" and answer.verdict == "explained"
     assert float(finding.parameters["encoder_error"].value) == pytest.approx(0.006, rel=0.02)

@@ -435,8 +435,10 @@ def test_a_constant_load_is_no_friction_that_drives(healthy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("baseline", ["gaussian", "exponential", "coulomb-viscous"])
-@pytest.mark.parametrize("force", ["desired_current", "current"])
+@pytest.mark.parametrize(
+    ("baseline", "force"),
+    [("gaussian", "desired_current"), ("exponential", "current"), ("coulomb-viscous", "current")],
+)
 def test_a_robots_joint_is_never_made_worse(data_folder, baseline, force):
     """Once 3.8 to 10.1 %: a bump over speeds that no row had."""
     path = data_folder / "ur10e" / "joint_1.csv"

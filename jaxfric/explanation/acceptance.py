@@ -60,7 +60,7 @@ def accepted(
         if derived and not _confirmed(finalist, current, others, least):
             continue
         if (derived or effect.at_reversals) and of_smoothing(
-            finalist, current, others.rougher, least
+            finalist, current, others.rougher(), least
         ):
             continue
         return finalist

@@ -1,5 +1,7 @@
 """The regression problem of a recording: its rows, force and motion aligned, and the base's fit."""
 
+from collections.abc import Callable
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -43,12 +45,12 @@ class OtherRows(NamedTuple):
     left, or where they say nothing else.
 
     `between`, `wide`: through kernels of 4/3 and of twice the width; `rougher`: with a velocity
-    that is smoothed over less, where it is over more than the kernel.
+    that is smoothed over less, where it is over more than the kernel; made when first asked for.
     """
 
     between: Evidence | None
     wide: Evidence | None
-    rougher: Evidence | None
+    rougher: Callable[[], Evidence | None]
 
 
 class Problem(NamedTuple):
@@ -78,7 +80,7 @@ class Problem(NamedTuple):
     creeps: bool = False
     held: Evidence | None = None
     start: np.ndarray | None = None
-    rougher: Evidence | None = None
+    rougher: Callable[[], Evidence | None] = lambda: None
 
     @property
     def reversals(self) -> bool:
@@ -222,7 +224,7 @@ def _assembled(
     ours = ours or CandidateSet(evidence, structure, candidate_sets[0])
     every = (ours, *(some for some in candidate_sets if some is not ours))
     between = _wider(motion, evidence, delay, across, BETWEEN)
-    rougher = _rougher(motion, evidence, delay, across)
+    rougher = cache(partial(_rougher, motion, evidence, delay, across))
     return Problem(evidence, wide, between, base, block, structure, every, delay, rougher=rougher)
 
 

@@ -53,8 +53,9 @@ def _shown(current: Fit, problem: Problem, share: float, size: float, seed: int)
     """
     located = locate(with_predictions(problem.evidence, current), current, seed)
     found = significant(located, share, size)
-    for others in (problem.wide, problem.rougher):
-        found = in_others(found, current, others, seed)
+    found = in_others(found, current, problem.wide, seed)
+    if any(s.coordinate in ACCELERATED for s in found):
+        found = in_others(found, current, problem.rougher(), seed)
     return Shown(lasting(found, current, problem, seed), located[:1])
 
 

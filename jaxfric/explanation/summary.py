@@ -178,7 +178,7 @@ def _halvable(findings: Findings, filtered: Mapping[str, Any]) -> bool:
     left = filtered["force_error"]["after"] * float(np.sqrt(np.mean(problem.evidence.force**2)))
 
     def made(finalist: Finalist) -> bool:
-        return of_smoothing(finalist, selection.last, problem.rougher)
+        return of_smoothing(finalist, selection.last, problem.rougher())
 
     return left > LINEARITY * problem.evidence.peak and halvable(selection.remaining, made)
 
