@@ -79,7 +79,8 @@ def test_every_kind_has_a_sentence_with_its_number():
     [
         (-1.0, "velocity_sign", "opposite sign"),
         (60 / (2 * np.pi), "velocity_scale", "rpm beside rad"),
-        (1000.0, "velocity_scale", "0.001"),
+        (1000.0, "velocity_scale", "velocity=0.001,"),
+        (1.01e-3, "velocity_scale", "velocity=1000,"),
         (180 / np.pi, "velocity_scale", "deg/s beside rad"),
         (0.93, "velocity_gain", "1.075"),
     ],

@@ -7,10 +7,16 @@ import numpy as np
 import pytest
 
 from jaxfric.checks.kinds import places, remarks
-from jaxfric.explanation import errors, reported, structure, summary, wording
+from jaxfric.explanation import doubts, errors, reported, structure, summary, wording
+from jaxfric.explanation.farther import farther
 from jaxfric.explanation.finding import Finding, Moved
 from jaxfric.explanation.quantities import nil, quantity, turns
-from jaxfric.explanation.sentences import factor_sentence, mismatch_sentence, sentence
+from jaxfric.explanation.sentences import (
+    changed_sentence,
+    factor_sentence,
+    mismatch_sentence,
+    sentence,
+)
 from jaxfric.identification.uncertainty import Estimate
 from jaxfric.terms.effect import Extent
 from jaxfric.terms.effects import EFFECTS
@@ -515,3 +521,49 @@ def test_a_baseline_that_describes_nothing_is_told(before, noise, verdict, said,
 def test_a_force_is_taken_later_or_earlier(value, words):
     (remark,) = remarks(places({"force_late": value}), {"force": "N", "position": "m"})
     assert remark.text.startswith(f"Taken {words}, the force")
+
+
+def scales(low, high, fastest):
+    return types.SimpleNamespace(low=low, high=high, fastest=fastest)
+
+
+@pytest.mark.parametrize(
+    ("there", "said"),
+    [
+        (scales(-1.0, 10.0, 50.0), ""),
+        (scales(-3.0, 10.0, 50.0), "goes from -3 to 10 mm, this one from 0 to 10 mm:"),
+        (scales(0.0, 10.0, 60.0), "moves at up to 60 mm/s, this one at 50:"),
+        (scales(0.0, 12.0, 60.0), "10 mm, and moves at up to 60 mm/s"),
+    ],
+)
+def test_where_only_the_held_out_recording_moves_is_told(there, said):
+    motion = types.SimpleNamespace(unit_names={"position": "mm", "force": "N"})
+    here, held = (
+        types.SimpleNamespace(limits=limits, located=True, motion=motion)
+        for limits in (scales(0.0, 10.0, 50.0), there)
+    )
+    told = farther(types.SimpleNamespace(evidence=here, held=held))
+    assert (said in told) if said else not told
+    assert not farther(types.SimpleNamespace(evidence=here, held=None))
+
+
+@pytest.mark.parametrize(("fall", "told"), [(-2.2, "2.17 N"), (-1.0, ""), (2.2, "")])
+def test_two_coulomb_levels_that_change_against_each_other_are_a_constant_force(fall, told):
+    moved = {
+        "coulomb+": Moved(77.2, Estimate(77.2 + 2.14, 0.05, "N"), 0.04),
+        "coulomb-": Moved(42.8, Estimate(42.8 + fall, 0.05, "N"), 0.04),
+    }
+    text = changed_sentence(moved, 0.9, "march.csv")
+    assert (f"a constant force of {told}" in text) if told else "constant force" not in text
+
+
+@pytest.mark.parametrize(("height", "told"), [(-0.4, True), (-0.05, False), (0.4, False)])
+def test_a_bump_upside_down_is_told_where_it_is_sure(height, told):
+    """0.05 N is within 3.5 standard errors of none."""
+    parameters = {
+        "coulomb+": Estimate(-1.0, 0.1, "N"),
+        "stribeck_force+": Estimate(height, 0.02, "N"),
+    }
+    motion = types.SimpleNamespace(channels={})
+    text = doubts.falling(parameters, types.SimpleNamespace(peak=5.0, motion=motion))
+    assert ("stribeck_force+" in text and "upside down" in text) if told else not text

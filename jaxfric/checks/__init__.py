@@ -13,12 +13,12 @@ from .kinds import (
     NAMES as NAMES,
     Remark as Remark,
     none as none,
-    passive as passive,
     places as places,
     remarks as remarks,
 )
 from .lateness import Lateness as Lateness, lateness as lateness, looks as looks
 from .misfit import Misfit as Misfit, misfit as misfit
+from .named import NO_STRIBECK as NO_STRIBECK, is_bump as is_bump, passive as passive
 from .recorded import recorded as recorded, recorded_rows as recorded_rows
 from .structure import hides as hides
 

@@ -1,6 +1,5 @@
 """The faults that are looked for: names, severity, and the sentence with the remedy."""
 
-import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -334,17 +333,6 @@ KINDS = (
     ),
 )
 NAMES = tuple(kind.name for kind in KINDS)
-
-
-# Of these no passive axis has less than zero: not their share by direction or by a wave over the
-# position (`coulomb_asymmetry`, `inertia_cos`), which has either sign.
-_PASSIVE = re.compile(r"(inertia|coulomb|viscous)(_\d+)?[+-]?")
-
-
-def passive(name: str) -> str:
-    """Which of inertia, Coulomb and viscous friction a parameter is; empty for another one."""
-    match = _PASSIVE.fullmatch(name)
-    return match[1] if match else ""
 
 
 def none() -> np.ndarray:

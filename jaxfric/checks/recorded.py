@@ -103,9 +103,8 @@ class _Log(NamedTuple):
         recording, clock, found = self.recording, self.clock, dict(self.found)
         found |= clock_faults(recording, clock)
         if choice is not None:
-            found = derivative_faults(choice, velocity[valid]) | found
-            if "no_motion" in found:  # then there is no velocity to say anything of
-                found.pop("velocity_noise", None)
+            if "no_motion" not in found:  # else there is no velocity to say anything of
+                found |= derivative_faults(choice, velocity[valid])
         elif suspect.pace:
             found |= coarse(recording, velocity, clock)
             if (spikes := jumps(recording, velocity, clock)) > 0:

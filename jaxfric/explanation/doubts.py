@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from .. import terms as laws
-from ..checks import Remark
+from ..checks import NO_STRIBECK, Remark, is_bump
 from ..identification.uncertainty import Estimate
 from ..terms.base import AbstractTerm, summands
 from ..units import VELOCITY, spell
@@ -25,8 +25,6 @@ CREEPS = "creeps"
 # More than half of the force's power: the model is further from the force than no force at all is
 # from what it leaves.
 UNDESCRIBED = 0.5
-# How the name of a bump's height begins.
-BUMP = "stribeck_force"
 
 
 def drives(current: Fit, evidence: Evidence, block: np.ndarray) -> bool:
@@ -84,7 +82,7 @@ def falling(parameters: dict[str, Estimate], evidence: Evidence) -> str:
     found = [
         f"{name} {quantity(each)}"
         for name, each in parameters.items()
-        if name.startswith(BUMP)
+        if is_bump(name)
         and float(each.value) + SURE * float(each.standard_error) < 0
         and -float(each.value) > LINEARITY * evidence.peak
     ]
@@ -92,9 +90,8 @@ def falling(parameters: dict[str, Estimate], evidence: Evidence) -> str:
         return ""
     return (
         f"The baseline as fitted has its bump upside down: {' and '.join(found)}. Friction falls "
-        "towards zero speed then, instead of rising. That is no Stribeck effect, and the other "
-        "values are beside it. A drag that falls again at speed (an eddy-current brake), friction "
-        "that passes zero speed gradually, presliding, lag or a dead time near reversals looks so."
+        f"towards zero speed then, instead of rising. {NO_STRIBECK} So does a drag that falls "
+        "again at speed, as of an eddy-current brake. The other values are beside it."
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..checks.kinds import passive
+from ..checks import NO_STRIBECK, is_bump, passive
 from ..data import summary
 from ..data.printable import printable
 from ..looks.text import Block, Table, aligned, text, wrapped
@@ -224,8 +224,8 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
     """What an engineer would object to, said first; what the warnings say is not said again."""
     seen = {name: entry for name, entry in parameters.items() if entry["interval"]}
     sizes = {name: (entry["value"], _half(entry)) for name, entry in seen.items()}
-    falling = [n for n, (value, half) in sizes.items() if _bump(n) and value < -half]
-    faint = [n for n, (value, half) in sizes.items() if _bump(n) and abs(value) <= half]
+    falling = [n for n, (value, half) in sizes.items() if is_bump(n) and value < -half]
+    faint = [n for n, (value, half) in sizes.items() if is_bump(n) and abs(value) <= half]
     loaded = any(warning["name"] == LOAD for warning in said)
     counted = {"viscous", "inertia"} if loaded else {"coulomb", "viscous", "inertia"}
     wrong = [n for n, (value, half) in sizes.items() if passive(n) in counted and value < -half]
@@ -233,8 +233,7 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
     if falling:
         lines.append(
             f"{' and '.join(falling)} negative: friction falls towards zero speed instead of "
-            "rising. That is no Stribeck effect; friction that passes zero speed gradually, "
-            "presliding, lag or a dead time near reversals looks so."
+            f"rising. {NO_STRIBECK}"
         )
     if faint:
         lines.append(
@@ -248,10 +247,6 @@ def _remarks(parameters: Mapping[str, Any], said: Sequence[Mapping[str, Any]]) -
             "still falls at the fastest speed: then go faster, or give wider bounds."
         )
     return lines
-
-
-def _bump(name: str) -> bool:
-    return name.startswith("stribeck_force")
 
 
 def explanation(document: Mapping[str, Any]) -> str:
