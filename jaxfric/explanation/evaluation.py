@@ -13,7 +13,6 @@ import numpy as np
 
 from .. import programs
 from ..data.recording import Recording
-from ..terms import KNOWN
 from ..terms.base import AbstractTerm
 
 # Values of the nonlinear parameters that one compiled call takes: of a grid, or one with the
@@ -61,14 +60,6 @@ def in_batches(
 def sizes(term: AbstractTerm) -> tuple[int, int]:
     """How many β one compiled call takes: of few, and of many."""
     return (NEIGHBOURS, STEPPED) if term.stepped else (PAIR, BATCH)
-
-
-def without_known(motion: Recording) -> Recording:
-    """A motion without what a simulator says of it, for which nothing is to be compiled anew."""
-    channels = {k: v for k, v in motion.channels.items() if not k.startswith(KNOWN)}
-    if len(channels) == len(motion.channels):
-        return motion
-    return dataclasses.replace(motion, channels=channels)
 
 
 def _columns(form, betas, numbers, motion):

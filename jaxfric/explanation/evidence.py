@@ -6,6 +6,7 @@ weak form is a weighted sum of thirteen of them: the same linear functional for 
 every column, at a cost that follows the record's bandwidth and not its sample rate.
 """
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -21,7 +22,7 @@ from ..terms.base import AbstractTerm, summands
 from ..terms.sample import Scales
 from .evaluation import BATCH, PAIR, evaluate, in_batches
 from .motion import Motion, derived, motion_of
-from .nodes import NODES, averaged, node_signals, padded, stride, windows
+from .nodes import NODES, Means, averaged, node_signals, padded, stride, windows
 
 
 class Evidence(NamedTuple):
@@ -209,17 +210,18 @@ def gather(
     **Raises:** `ValueError` if the axis hardly slips.
     """
     motion = recording if isinstance(recording, Motion) else derived(recording)
-    prepared, count = motion.padded, motion.recording.num_samples
+    prepared = motion.padded
     limits = Scales(*(float(x) for x in signals.host_scales(prepared)[0]))
     if reach is not None:
         half_width = max(1, int(round(reach / limits.interval)))
     # Of a position that comes seldom no two nodes lie between the same two updates.
     usual = half_width or _usual(prepared, limits.slowest)
     width = max(int(usual), half * motion.recording.position_every)
-    prepared = jax.tree.map(lambda x: np.asarray(x)[:count], prepared)
+    prepared = motion.on_host()
     step = max(1, round(width / half))
     span = float(step * half * limits.interval)
-    parts = node_signals(prepared, limits, step, delay, motion.smoothed)
+    means = Means.of(motion, limits.interval, step)
+    parts = node_signals(motion, means, limits.interval, delay)
     index, whole, average, slope = windows(parts, span, half)
     rows = _moving(parts["velocity"][index], whole, average, limits.slowest, reversals)
     if prepared.position is not None:
@@ -260,6 +262,20 @@ def gather(
         noise=signals.host_white_noise(first, linked),
         repeats=motion.repeats,
     )
+
+
+def reduced(
+    motion: Motion, evidence: Evidence, parts: Iterable[tuple[np.ndarray, np.ndarray]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rest and momentum of forces, `(N,)` each, at the nodes of the evidence of a motion, `(p, M)`:
+    as its recording's channels, but nothing else has to hold them.
+    """
+    step = evidence.width // evidence.half
+    means = Means.of(motion, evidence.limits.interval, step)
+    pairs = [(means.instant(rest), means.instant(more, derived=True)) for rest, more in parts]
+    plain, momentum = np.array(pairs).reshape(-1, 2, len(means.label)).swapaxes(0, 1)
+    pads = (0, 0), (0, evidence.motion.num_samples - len(means.label))
+    return np.pad(plain, pads, mode="edge"), np.pad(momentum, pads, mode="edge")
 
 
 def _usual(prepared: Recording, slowest: float) -> int:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable, Collection
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from ..data.recording import Recording
@@ -14,7 +13,7 @@ from ..simulators.weights import by_gravity, linear, pulled
 from ..terms import KnownColumns, KnownForce, Offset, channels_of
 from ..terms.base import AbstractTerm, summands
 from ..terms.effects import traits
-from .evidence import Evidence, gather
+from .evidence import Evidence, gather, reduced
 from .fewest import SURE
 from .figures import cast
 from .least_squares import orthonormal, solve
@@ -48,46 +47,50 @@ class JointRows(NamedTuple):
 
 
 class Opened(NamedTuple):
-    """A joint's evidence with what the model's values add to its force as channels.
+    """A joint's evidence, and what the model's values add to its force.
 
-    `own`: rows `(J, p)` by the values of its own, of those `names`; `shared`: the columns that all
-    joints have: three of gravity, ten of each body with mass, then the products of both.
+    `own`: rows `(J, p)` by the values of its own, of those `names`; then by what all joints have,
+    three of gravity, ten of each body with mass, and the products of both, P together: `columns`
+    `(J, P)`, and their rest and momentum at the nodes, `shared`, `(P, M)` each.
     """
 
     evidence: Evidence
     names: tuple[str, ...]
     own: np.ndarray
-    shared: KnownColumns
+    columns: np.ndarray
+    shared: tuple[np.ndarray, np.ndarray]
 
 
 def opened(
     simulator: Mujoco, log: Recording, delay: float, wide: int = 1, width: int | None = None
 ) -> Opened:
     """A joint's evidence, by a simulator as given; the arguments as of [`joint_rows`][]."""
-    seen = simulator.along(log)
+    seen, beside = simulator.along(log), simulator.beside(log)
     of = simulator.mujoco, simulator.model, simulator.number, seen
     turned, products = (
         [(rest, np.zeros_like(rest)) for rest in each(*of)] for each in (by_gravity, pulled)
     )
-    parts = turned + linear(*of) + products
-    names = [name for name in simulator.attributes() if not name.startswith("body/")]
-    first = len(simulator.attributes())
-    beside = simulator.beside(log)
-    channels = dict(beside.channels)
-    for number, pair in enumerate(parts):
-        channels |= dict(zip(channels_of(first + number), map(jnp.asarray, pair), strict=True))
-    motion = motion_of(cast(dataclasses.replace(beside, channels=channels)))
+    attributes = [channels_of(number) for number in range(len(simulator.attributes()))]
+    each = {n: np.asarray(beside.channels[n], float) for pair in attributes for n in pair}
+    bare = {n: values for n, values in beside.channels.items() if n not in each}
+    motion = motion_of(cast(dataclasses.replace(beside, channels=bare)))
     evidence = gather(motion, width, delay=delay)
     if wide > 1:
         evidence = gather(motion, wide * evidence.width, delay, half=wide * NODES)
-    every = KnownColumns(tuple(simulator.attributes()), ("1",) * first)
-    shared = KnownColumns(tuple(f"{i}" for i in range(len(parts))), ("1",) * len(parts), first)
-    known = evidence.columns(every, np.zeros((1, 0)))[0]
-    own = [known[:, [i]] for i, name in enumerate(every.names) if name in names]
+    names, own = [], []
+    for name, (rest, momentum) in zip(simulator.attributes(), attributes, strict=True):
+        if not name.startswith("body/"):
+            names.append(name)
+            own.append((each[rest], each[momentum]))
+    known = evidence.project(*reduced(motion, evidence, own)).T
     constant = [t for t in summands(simulator.baseline(log.units).term) if isinstance(t, Offset)]
-    own += [evidence.columns(t, np.zeros((1, 0)))[0] for t in constant]
+    more = [evidence.columns(t, np.zeros((1, 0)))[0] for t in constant]
     names += [p.name for t in constant for p in t.affine]
-    return Opened(evidence, tuple(names), np.concatenate(own, axis=1), shared)
+    shared = reduced(motion, evidence, turned + linear(*of) + products)
+    return Opened(
+        evidence, tuple(names), np.concatenate([known, *more], axis=1),
+        evidence.project(*shared).T, shared,
+    )  # fmt: skip
 
 
 def joint_rows(
@@ -101,8 +104,8 @@ def joint_rows(
     which the force is taken later; `linearity` of a sensor of force, relative; `wide`: how many
     times the usual kernel's width, or how many times `width`, samples in half of it.
     """
-    evidence, names, own, shared = opened(simulator, log, delay, wide, width)
-    columns = np.concatenate([own, evidence.columns(shared, np.zeros((1, 0)))[0]], axis=1)
+    evidence, names, own, shared, _ = opened(simulator, log, delay, wide, width)
+    columns = np.concatenate([own, shared], axis=1)
     basis = physics(found, evidence, among(needless))
     columns = columns - basis @ (basis.T @ columns)
     target = evidence.target - basis @ (basis.T @ evidence.target)

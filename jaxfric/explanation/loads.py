@@ -154,15 +154,19 @@ def _felt(told: Told, body: str) -> Felt:
     """
     simulator, model = told.simulator, told.explanation.model
     delay = told.explanation.fit["filtered_force_error"]["force_taken_later"]
-    evidence, _, own, shared = opened(simulator, told.logs[0], delay)
+    evidence, _, own, columns, shared = opened(simulator, told.logs[0], delay)
     bodies = list(weights(simulator.mujoco, simulator.model))
     first = len(GRAVITY)
-    linear = [shared.only(i) for i in range(first, first + PARAMETERS * len(bodies))]
-    others = [evidence.columns(each, np.zeros((1, 0)))[0] for each in linear]
+    others = columns[:, first : first + PARAMETERS * len(bodies)]
     found = physics(model, evidence, but=_steps_a_value)
-    basis = orthonormal(np.concatenate([own, *others, found], axis=1))
-    start = shared.first + first + PARAMETERS * bodies.index(body)
-    law = KnownColumns(shared.names[:PARAMETERS], shared.spelled[:PARAMETERS], start)
+    basis = orthonormal(np.concatenate([own, others, found], axis=1))
+    start = first + PARAMETERS * bodies.index(body)
+    names = tuple(f"{i}" for i in range(PARAMETERS))
+    law = KnownColumns(names, ("1",) * PARAMETERS, len(simulator.attributes()))
+    pairs = zip(law.channels, *(each[start:] for each in shared), strict=False)
+    evidence = evidence.with_channels(
+        **{n: values for pair, *both in pairs for n, values in zip(pair, both, strict=True)}
+    )
     target = evidence.target - basis @ (basis.T @ evidence.target)
     return Felt(evidence, target, basis, law, LINEARITY**2 * float(evidence.force @ evidence.force))
 

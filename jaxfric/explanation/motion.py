@@ -3,24 +3,24 @@
 import dataclasses
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from .. import signals
 from ..data.recording import Recording, pad
 from ..terms import KNOWN_MASKED
-from .evaluation import without_known
 from .repeats import repeated_after
 
 
 class Motion(NamedTuple):
     """A recording whose velocity has been derived, once for all the rows that are made of it.
 
-    `recording`: as it was read, `(N,)`; `padded`: with its velocity, of one of few lengths, so that
-    few programs are compiled; `smoothed`: by how much that velocity has been, in samples², see
-    `signals.smoothing`; `repeats`: the time, s, after which it repeats itself to a count, or zero;
-    `polynomial`: the half-width, in samples, of the local polynomial that the velocity is derived
-    by, zero where it is recorded.
+    `recording`: as it was read, `(N,)`; `padded`: with its velocity and without channels, of one of
+    few lengths, so that few programs are compiled; `smoothed`: by how much that velocity has been,
+    in samples², see `signals.smoothing`; `repeats`: the time, s, after which it repeats itself to a
+    count, or zero; `polynomial`: the half-width, in samples, of the local polynomial that the
+    velocity is derived by, zero where it is recorded.
     """
 
     recording: Recording
@@ -29,11 +29,18 @@ class Motion(NamedTuple):
     repeats: float = 0.0
     polynomial: int = 0
 
+    def on_host(self) -> Recording:
+        """The recording with its velocity, without channels, as arrays of numpy, `(N,)`."""
+        count = self.recording.num_samples
+        return jax.tree.map(lambda values: np.asarray(values)[:count], self.padded)
+
     def forced(self, force: Any) -> "Motion":
         """The same motion with another force, N, `(N,)`."""
+        values = np.asarray(force)
+        extra = self.padded.num_samples - len(values)
+        longer = dataclasses.replace(self.padded, force=np.pad(values, (0, extra), mode="edge"))
         other = dataclasses.replace(self.recording, force=jnp.asarray(force))
-        longer = pad(other, self.padded.num_samples).force
-        return self._replace(recording=other, padded=dataclasses.replace(self.padded, force=longer))
+        return self._replace(recording=other, padded=longer)
 
 
 def motion_of(recording: "Recording | Motion") -> Motion:
@@ -58,20 +65,21 @@ def derived(recording: Recording, narrower: float = 1.0) -> Motion:
     """The motion of a recording by its velocity, where it has one; else by a local polynomial of
     the width that tells it best, or of so much of that.
     """
-    # The name and the number of segments would be compiled in.
-    nameless = dataclasses.replace(
-        recording, source="", sha256="", num_segments=1, position_every=1
-    )
-    bare = without_known(nameless)
-    bare = dataclasses.replace(bare, mask=moves(recording))
-    padded, whole = (pad(log, padded_length(recording.num_samples)) for log in (bare, nameless))
+    # The name and the number of segments would be compiled in, and so would names of channels.
+    bare = dataclasses.replace(
+        recording, source="", sha256="", num_segments=1, position_every=1, channels={},
+        mask=moves(recording),
+    )  # fmt: skip
+    padded = pad(bare, padded_length(recording.num_samples))
     smoothed, polynomial = 0.0, 0
     if padded.velocity is None:
         choice = signals.choose(padded)
         polynomial = max(1, round(narrower * choice.half_width))
         choice = choice._replace(half_width=polynomial)
         padded, smoothed = signals.prepare(padded, choice), signals.smoothing(choice)
-    padded = dataclasses.replace(padded, mask=whole.mask, channels=whole.channels)
+    mask = np.zeros(padded.num_samples, bool)
+    mask[: recording.num_samples] = np.asarray(recording.mask)
+    padded = dataclasses.replace(padded, mask=mask)
     return Motion(recording, padded, smoothed, repeated_after(recording), polynomial)
 
 

@@ -1,8 +1,9 @@
 """Nodes: local means of a recording, a sixth of the kernel apart, and their weights in rows."""
 
 import dataclasses
+from typing import NamedTuple
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 
 from .. import signals
@@ -16,8 +17,7 @@ from ..terms import (
     KNOWN_REST,
     at_other_times,
 )
-from ..terms.sample import Scales
-from .motion import moves, padded_length
+from .motion import Motion, moves, padded_length
 
 # Nodes in half a kernel: the trapezoidal rule on them errs by the kernel's spectrum at 2π·6/h,
 # which is below 1e-4 of its peak. A wider kernel on the same nodes has more of them.
@@ -32,61 +32,112 @@ def stride(half: int) -> int:
     return STRIDE * half // NODES
 
 
-def node_signals(
-    recording: Recording, limits: Scales, step: int, delay: float, smoothed: float
-) -> dict:
-    """Local means of every signal, `step` samples apart, with the run that each node lies in, and
-    whether its force is `compared`: what has a memory goes on where a simulator's says nothing.
+class Means(NamedTuple):
+    """How signals become local means, `step` samples apart: by triangles twice as wide.
 
-    `smoothed`: by how much the velocity has been, in samples², see `signals.smoothing`.
+    - `fading`, `rising`: the weights of the samples from each node on in its mean and in the next
+      one's, `(M, step)`; `known`: which samples count, `(N,)`.
+    - `run`: the run that each sample lies in, `(N,)`, and each node, `label` `(M,)`, one of its own
+      where there is no sample; `inner`: which nodes have both neighbours in their run, `(M - 2,)`.
+    - `compared`: whether all that a node is made of has a force to compare; what has a memory goes
+      on where a simulator's says nothing.
+    - `smoothed`: by how much the velocity has been, in squared steps, see `signals.smoothing`.
     """
-    time, mask = np.asarray(recording.time, float), moves(recording)
-    silent = mask & ~np.asarray(recording.mask)
-    linked = signals.host_continuous(dataclasses.replace(recording, mask=mask), limits.interval)
-    run = np.pad(np.cumsum(~linked), (1, 0))
-    steps = np.where(linked, np.diff(time), limits.interval)
-    series = {
-        "time": time,
-        "force": np.asarray(recording.force, float),
-        "velocity": np.asarray(recording.velocity, float),
-        "elapsed": np.pad(np.cumsum(steps), (1, 0)),
+
+    step: int
+    fading: np.ndarray
+    rising: np.ndarray
+    known: np.ndarray
+    run: np.ndarray
+    label: np.ndarray
+    inner: np.ndarray
+    compared: np.ndarray
+    smoothed: float
+
+    @classmethod
+    def of(cls, motion: Motion, interval: float, step: int) -> "Means":
+        """Those of a motion; `interval` of its samples, s."""
+        recording = motion.on_host()
+        mask = moves(motion.recording)
+        linked = signals.host_continuous(dataclasses.replace(recording, mask=mask), interval)
+        run = np.pad(np.cumsum(~linked), (1, 0))
+        first = run[::step]
+        count = len(first)
+        samples, valid = _blocks(run, count, step), _blocks(mask, count, step)
+        near = valid & (samples == first[:, None])
+        after = np.zeros_like(valid)
+        after[:-1] = valid[:-1] & (samples[:-1] == first[1:, None])
+        fading, rising = near * np.arange(step, 0.0, -1.0), after * np.arange(0.0, step)
+        total = fading.sum(axis=1) + _before(rising.sum(axis=1))
+        label = np.where(total > 0, first, -1 - np.arange(count))
+        size = np.where(total > 0, total, 1.0)
+        silent = _blocks(mask & ~np.asarray(recording.mask), count, step)
+        here, next_ = (((part > 0) & silent).any(axis=1) for part in (fading, rising))
+        fading /= size[:, None]
+        rising[:-1] /= size[1:, None]
+        inner = (label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])
+        compared = ~(here | _before(next_))
+        smoothed = motion.smoothed / step**2
+        return cls(step, fading, rising, mask, run, label, inner, compared, smoothed)
+
+    def plain(self, values: np.ndarray) -> np.ndarray:
+        """The means of a signal, `(N,)` to `(M,)`."""
+        blocks = _blocks(np.where(self.known, values, 0.0), *self.fading.shape)
+        after = np.einsum("ms,ms->m", blocks, self.rising)
+        return np.einsum("ms,ms->m", blocks, self.fading) + _before(after)
+
+    def instant(self, values: np.ndarray, derived: bool = False) -> np.ndarray:
+        """A signal of the motion as it is at the nodes, `(N,)` to `(M,)`.
+
+        Terms are functions of the motion at an instant, not of its mean: the curvature that the
+        triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
+        and the columns' weights take it off again, so that force and columns are averaged alike. So
+        is what the derivative took off a `derived` one, which would look like a load on a spring.
+        """
+        found = self.plain(values)
+        lost = 1 / 12 + (self.smoothed if derived else 0.0)
+        found[1:-1] -= np.where(self.inner, lost * np.diff(found, 2), 0.0)
+        return found
+
+
+def _blocks(values: np.ndarray, count: int, step: int) -> np.ndarray:
+    """Samples from each node to the next, `(N,)` to `(M, step)`; none beyond the end."""
+    whole = np.zeros(count * step, values.dtype)
+    whole[: len(values)] = values
+    return whole.reshape(count, step)
+
+
+def _before(values: np.ndarray) -> np.ndarray:
+    """What each node has of the one before it, `(M,)`."""
+    return np.concatenate([np.zeros(1, values.dtype), values[:-1]])
+
+
+def node_signals(motion: Motion, means: Means, interval: float, delay: float) -> dict:
+    """Local means of every signal, with the run that each node lies in, and whether its force is
+    `compared`; `interval` of samples, s; `delay`, s, by which the force is taken later.
+    """
+    recording, velocity = motion.recording, np.asarray(motion.on_host().velocity, float)
+    time, force = np.asarray(recording.time, float), np.asarray(recording.force, float)
+    steps = np.where(np.diff(means.run) == 0, np.diff(time), interval)
+    if delay:
+        force = at_other_times(
+            recording, force, lambda force: _later(time, force, means.run, delay)
+        )
+    found = {
+        "time": means.plain(time),
+        "force": means.plain(force),
+        "velocity": means.instant(velocity, derived=True),
+        "elapsed": means.plain(np.pad(np.cumsum(steps), (1, 0))),
     }
     if recording.position is not None:
-        series["position"] = np.asarray(recording.position, float)
-    channels = {k: v for k, v in recording.channels.items() if k != KNOWN_MASKED}
-    series |= {f"channel {k}": np.asarray(v, float) for k, v in channels.items()}
-    if delay:
-        series["force"] = at_other_times(
-            recording, series["force"], lambda force: _later(time, force, run, delay)
-        )
-    centres = np.arange(0, len(time), step)
-    offsets = np.arange(-(step - 1), step)
-    at = np.clip(centres[:, None] + offsets[None, :], 0, len(time) - 1)
-    near = mask[at] & (run[at] == run[centres][:, None])
-    near &= centres[:, None] + offsets[None, :] == at
-    weight = np.where(near, (step - np.abs(offsets))[None, :], 0.0)
-    total = weight.sum(axis=1)
-    weight /= np.where(total > 0, total, 1.0)[:, None]
-    means = {
-        name: np.einsum("ij,ij->i", weight, np.where(near, values[at], 0.0))
-        for name, values in series.items()
-    }
-    label = np.where(total > 0, run[centres], -1 - np.arange(len(centres)))
-    # Terms are functions of the motion at an instant, not of its mean: the curvature that the
-    # triangle of weights took off (its variance is a sixth of the squared spacing) is put back,
-    # and the columns' weights take it off again, so that force and columns are averaged alike. So
-    # is what the derivative took off the velocity, which would look like a load on a spring.
-    inner = np.flatnonzero((label[1:-1] == label[:-2]) & (label[1:-1] == label[2:])) + 1
-    known = KNOWN_FORCE, KNOWN_FRICTION, KNOWN_REST, KNOWN_FEEDBACK
-    forces = {"force", *(f"channel {n}" for n in known)}
-    for name in set(means) - forces - {"time", "elapsed"}:
-        values = means[name]
-        bend = values[inner + 1] - 2 * values[inner] + values[inner - 1]
-        means[name] = values.copy()
-        derived = name == "velocity" or name.endswith("momentum")
-        lost = 1 / 12 + (smoothed / step**2 if derived else 0.0)
-        means[name][inner] -= lost * bend
-    return means | {"run": label, "compared": ~np.any(near & silent[at], axis=1)}
+        found["position"] = means.instant(np.asarray(recording.position, float))
+    for name, signal in recording.channels.items():
+        values = np.asarray(signal, float)
+        if name in (KNOWN_FORCE, KNOWN_FRICTION, KNOWN_REST, KNOWN_FEEDBACK):
+            found[f"channel {name}"] = means.plain(values)
+        elif name != KNOWN_MASKED:
+            found[f"channel {name}"] = means.instant(values, name.endswith("momentum"))
+    return found | {"run": means.label, "compared": means.compared}
 
 
 def _later(time, force, run, delay):
@@ -128,13 +179,12 @@ def padded(parts: dict, recording: Recording) -> Recording:
     length = padded_length(count)
 
     def pad(values):
-        return jnp.asarray(np.pad(values, (0, length - count), mode="edge"))
+        return np.concatenate([values, np.full(length - count, values[-1])])
 
-    position = pad(parts["position"]) if "position" in parts else None
     channels = {k[8:]: pad(v) for k, v in parts.items() if k.startswith("channel ")}
     labels = np.unique(parts["run"], return_inverse=True)[1].astype(np.int32)
-    segment = jnp.asarray(np.pad(labels, (0, length - count), mode="edge"))
-    return Recording(
-        pad(parts["time"]), pad(parts["force"]), position, pad(parts["velocity"]),
-        segment=segment, channels=channels, num_segments=1, units=recording.units,
-    )  # fmt: skip
+    names = ("time", "force", "velocity", "position")
+    series = {name: pad(parts[name]) for name in names if name in parts}
+    # In one go: each by itself takes twice as long.
+    at = jax.device_put(series | {"segment": pad(labels), "channels": channels})
+    return Recording(**at, num_segments=1, units=recording.units)

@@ -1,7 +1,7 @@
 """A spring that is tried in the transmission of one joint, on the rows of all joints."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from ..simulators import Mujoco, elastic
 from ..simulators.inverse import Motion
 from ..simulators.loading import is_hinge
 from ..simulators.weights import by_gravity, linear as by_weights, weights
-from ..terms import KNOWN, KNOWN_FORCE, KNOWN_MASKED
+from ..terms import KNOWN_FORCE, KNOWN_MASKED
 from .agreement import Told
 from .elastic_rows import (
     Box,
@@ -24,11 +24,11 @@ from .elastic_rows import (
     refined,
     responses,
 )
-from .evidence import Evidence, gather
+from .evidence import Evidence, gather, reduced
 from .figures import cast
 from .intervals import spread
 from .least_squares import orthonormal
-from .motion import motion_of
+from .motion import Motion as Moved, motion_of
 from .regression import Fit
 
 # Stiffnesses of the grid, a factor of two or so apart, and places of damping ratios with each; the
@@ -98,35 +98,31 @@ class Trial:
         motion = Motion(*(np.insert(part, link, 0.0, axis=1) for part in seen.motion))
         about = elastic.linear(first.mujoco, self.with_spring.model, motion, link)
         dofs = [self.with_spring.joints.index(each.simulator.joint) for each in self.told]
-        series = {"load": about.force[:, link]}
-        for what, part in zip("asp", about[1:], strict=True):
-            series |= {f"own {what}": part[:, link]}
-            series |= {f"{what} {i}": part[:, dof] for i, dof in enumerate(dofs)}
+        evidence, moved = self._evidence(there)
+        series = [about.force[:, link], *(part[:, link] for part in about[1:])]
+        series += [part[:, dof] for part in about[1:] for dof in dofs]
         of = first.mujoco, first.model, self.number, seen
         parts = [(rest, np.zeros_like(rest)) for rest in by_gravity(*of)] + by_weights(*of)
-        for i, (rest, momentum) in enumerate(parts):
-            series |= {f"rest {i}": rest, f"{i} momentum": momentum}
-        evidence = self._reduced(series, there)
-        at = {name: np.asarray(evidence.motion.channels[KNOWN + name]) for name in series}
+        still = np.zeros_like(series[0])
+        (load, *own), every = np.split(
+            reduced(moved, evidence, [(each, still) for each in series])[0], [4]
+        )
+        every = every.reshape(3, len(dofs), -1)
         time = _steady(np.asarray(evidence.motion.time, float), evidence.nodes)
         begins = np.diff(np.asarray(evidence.motion.segment), prepend=-1) != 0
-        every = np.array([[at[f"{w} {i}"] for i in range(len(dofs))] for w in "asp"])
-        own = np.array([at[f"own {what}"] for what in "asp"])
         rate = np.gradient(every[0], time, axis=1)
-        nodes = Nodes(time, begins, at["load"], own, every, rate)
-        loads = [at[f"rest {i}"] + np.gradient(at[f"{i} momentum"], time)
-                 for i in range(len(parts))]  # fmt: skip
-        return nodes, _box(nodes, evidence), np.array(loads)
+        nodes = Nodes(time, begins, load, np.array(own), every, rate)
+        rest, momentum = reduced(moved, evidence, parts)
+        return nodes, _box(nodes, evidence), rest + np.gradient(momentum, time, axis=1)
 
-    def _reduced(self, series: Mapping[str, np.ndarray], there: Recorded) -> Evidence:
-        """Signals at the nodes of the rows."""
+    def _evidence(self, there: Recorded) -> tuple[Evidence, Moved]:
+        """That of the rows, and the motion, without what the simulator's values add."""
         log = self.told[0].simulator.beside(self.told[0].logs[there.number])
         kept = {k: v for k, v in log.channels.items() if k in (KNOWN_FORCE, KNOWN_MASKED)}
-        more = {KNOWN + name: jnp.asarray(values) for name, values in series.items()}
-        motion = motion_of(cast(dataclasses.replace(log, channels=kept | more)))
+        motion = motion_of(cast(dataclasses.replace(log, channels=kept)))
         rows = there.rows.joints[0].evidence
         assert rows is not None  # the rows are of a recording
-        return gather(motion, there.width, half=rows.half)
+        return gather(motion, there.width, half=rows.half), motion
 
     def coarse(self, here: Recorded) -> tuple[float, np.ndarray]:
         """The energy of the grid's best spring, and its place."""

@@ -276,11 +276,8 @@ def _worth_it(undelayed: Solution, late: LateForce, base: Fit) -> Solution:
 
 def _of_commands(motion: Motion) -> Motion:
     """The motion without a servo's feedback: all of its force is what the command makes."""
-    logs = [
-        dataclasses.replace(log, channels={k: v for k, v in log.channels.items() if k != FEEDBACK})
-        for log in (motion.recording, motion.padded)
-    ]
-    return motion._replace(recording=logs[0], padded=logs[1])
+    channels = {k: v for k, v in motion.recording.channels.items() if k != FEEDBACK}
+    return motion._replace(recording=dataclasses.replace(motion.recording, channels=channels))
 
 
 def _undone(motion: Motion, effect: Effect | None, time: float) -> Motion:

@@ -154,8 +154,8 @@ def moved(model: Any, joint: int) -> set[str]:
 
 def _body(slope, body: int, joint: int, gravity) -> Callable[[Along], Parts]:
     def parts(seen: Along) -> Parts:
-        rest, momentum = rigid.regressor(seen.frames[body - 1], slope, gravity)
-        return rest[:, joint], momentum[:, joint]
+        rest, momentum = rigid.regressor(seen.frames[body - 1], joint, gravity)
+        return slope @ rest, slope @ momentum
 
     return parts
 

@@ -65,11 +65,12 @@ def _moments(mujoco: Any, model: Any, motion: Motion) -> Iterator[Any]:
 
 def sum_of_bodies(mujoco: Any, model: Any, frames) -> tuple[np.ndarray, np.ndarray]:
     """Rest and momentum of all bodies, `(N, dof)` each."""
-    parts = [
-        rigid.regressor(frame, rigid.about_origin(*weighed(mujoco, model, b)), model.opt.gravity)
-        for b, frame in enumerate(frames, 1)
-    ]
-    return sum(rest for rest, _ in parts), sum(momentum for _, momentum in parts)
+    found = np.zeros((2, model.nv, frames[0].velocity.shape[1]))
+    for b, frame in enumerate(frames, 1):
+        theta = rigid.about_origin(*weighed(mujoco, model, b))
+        for joint in range(model.nv):
+            found[:, joint] += theta @ np.array(rigid.regressor(frame, joint, model.opt.gravity))
+    return found[0].T, found[1].T
 
 
 def weighed(mujoco: Any, model: Any, body: int):

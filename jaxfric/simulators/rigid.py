@@ -20,8 +20,8 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 class Frames(NamedTuple):
-    """A body's frame along a motion: rotation `(N, 3, 3)`, velocities `(N, 3)`, Jacobians of the
-    origin and of the rotation and their rates, each `(N, 3, dof)`.
+    """A body's frame along a motion: rotation `(3, 3, N)`, velocities `(3, N)`, Jacobians of the
+    origin and of the rotation and their rates, each `(dof, 3, N)`.
     """
 
     rotation: np.ndarray
@@ -53,36 +53,50 @@ def frames(mujoco: Any, model: Any, position: np.ndarray, velocity: np.ndarray) 
             parts[b, i] = buffers
     found = []
     for b in bodies:
-        linear, turning, *rates = np.moveaxis(parts[b], 1, 0)
-        moving = np.einsum("nij,nj->ni", linear, velocity)
-        spin = np.einsum("nij,nj->ni", turning, velocity)
-        found.append(Frames(rotation[b], moving, spin, (linear, turning), (rates[0], rates[1])))
+        turned = np.ascontiguousarray(np.moveaxis(rotation[b], 0, -1))
+        linear, turning, *rates = np.ascontiguousarray(parts[b].transpose(1, 3, 2, 0))
+        moving, spin = (np.einsum("jin,nj->in", each, velocity) for each in (linear, turning))
+        found.append(Frames(turned, moving, spin, (linear, turning), (rates[0], rates[1])))
     return found
 
 
 def regressor(
-    frame: Frames, theta: Float[np.ndarray, "10"], gravity: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The generalised force of ten inertial parameters of a body: `(N, dof)` rest and momentum."""
-    rotation, moving, spin = frame.rotation, frame.velocity, frame.spin
-    inertia = np.zeros((3, 3))
-    for (i, j), value in zip(_PAIRS, theta[4:], strict=True):
-        inertia[i, j] = inertia[j, i] = value
-    moment = rotation @ theta[1:4]
-    turned = np.einsum("nij,nj->ni", rotation @ inertia @ rotation.swapaxes(1, 2), spin)
-    linear = theta[0] * moving + np.cross(spin, moment)
-    angular = turned + np.cross(moment, moving)
-    (by_move, by_turn), (move_rate, turn_rate) = frame.jacobians, frame.rates
+    frame: Frames, joint: int, gravity: Float[np.ndarray, "3"]
+) -> tuple[Float[np.ndarray, "10 N"], Float[np.ndarray, "10 N"]]:
+    """Rest and momentum of a joint's force by each of the ten inertial parameters of a body.
 
-    def pull(jacobian, force):
-        return np.einsum("nij,ni->nj", jacobian, np.broadcast_to(force, moving.shape))
+    The above, by the parameters: of the first moment r · (J_v × ω + v × J_w) is the momentum, of
+    the inertia Rᵀ J_w and Rᵀ ω by pairs.
+    """
+    moving, spin = frame.velocity, frame.spin
+    (by_move, by_turn), (move_rate, turn_rate) = (
+        [each[joint] for each in pair] for pair in (frame.jacobians, frame.rates)
+    )
+    down = np.broadcast_to(gravity[:, None], moving.shape)
 
-    momentum = pull(by_move, linear) + pull(by_turn, angular)
-    rest = -pull(move_rate, linear) - pull(turn_rate, angular)
+    def inside(vector: np.ndarray) -> np.ndarray:
+        return np.einsum("ijn,in->jn", frame.rotation, vector)
+
     # About an origin that moves itself the angular momentum changes by v × P, too.
-    rest += pull(by_turn, np.cross(moving, linear) - np.cross(moment, gravity))
-    rest -= pull(by_move, theta[0] * gravity)
-    return rest, momentum
+    across = _cross(by_turn, moving)
+    rest = _cross(across, spin) - _cross(move_rate, spin) + _cross(turn_rate, moving)
+    rest = [-_dot(move_rate, moving) - _dot(by_move, down), *inside(rest + _cross(by_turn, down))]
+    momentum = [_dot(by_move, moving), *inside(_cross(by_move, spin) - across)]
+    turn, turned, rate = inside(by_turn), inside(spin), inside(turn_rate)
+    for i, j in _PAIRS:
+        rest.append(-rate[i] * turned[j] - (rate[j] * turned[i] if i != j else 0.0))
+        momentum.append(turn[i] * turned[j] + (turn[j] * turned[i] if i != j else 0.0))
+    return np.array(rest), np.array(momentum)
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.einsum("in,in->n", one, other)
+
+
+def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Of vectors `(3, N)`; numpy's own is slow on the first axis."""
+    (a, b, c), (x, y, z) = one, other
+    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])
 
 
 def about_origin(

@@ -9,7 +9,6 @@ from jaxtyping import Float
 from . import rigid
 from .inverse import Along, weighed
 from .known import Attribute
-from .rigid import PARAMETERS
 
 # A mass whose inertia goes along with it in proportion, as of another density; one whose inertia
 # about its centre stays, as where another number stands in the file.
@@ -113,9 +112,8 @@ def linear(mujoco: Any, model: Any, joint: int, seen: Along) -> list[tuple[np.nd
     found = []
     for b in range(1, model.nbody):
         if model.body_mass[b] > 0:
-            for unit in np.eye(PARAMETERS):
-                rest, momentum = rigid.regressor(seen.frames[b - 1], unit, model.opt.gravity)
-                found.append((rest[:, joint], momentum[:, joint]))
+            parts = rigid.regressor(seen.frames[b - 1], joint, model.opt.gravity)
+            found += list(zip(*parts, strict=True))
     return found
 
 
@@ -147,12 +145,11 @@ def pulled(mujoco: Any, model: Any, joint: int, seen: Along) -> list[np.ndarray]
         if model.body_mass[b] <= 0:
             continue
         frame = seen.frames[b - 1]
-        moving, turning = (each[:, :, joint] for each in frame.jacobians)
-        found += [-moving[:, axis] for axis in range(3)]
+        moving, turning = (each[joint] for each in frame.jacobians)
+        found += list(-moving)
         for k in range(3):
             # J_wᵀ (r × g) is g · (J_w × r), r the frame's own axis.
-            arm = np.cross(turning, frame.rotation[:, :, k])
-            found += [-arm[:, axis] for axis in range(3)]
+            found += list(-np.cross(turning, frame.rotation[:, k], axis=0))
     return found
 
 

@@ -1,6 +1,7 @@
 """A force that another program has computed for the recorded motion."""
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, ClassVar
 
 import equinox as eqx
@@ -95,7 +96,7 @@ class KnownColumns(AbstractLaw):
     @property
     def channels(self) -> tuple[tuple[str, str], ...]:
         """The channels of each parameter, the rest and what is differentiated."""
-        return tuple(channels_of(self.first + i) for i in range(len(self.names)))
+        return _channels(self.first, len(self.names))
 
     @property
     def affine(self):
@@ -104,13 +105,23 @@ class KnownColumns(AbstractLaw):
 
     @property
     def coordinates(self):
-        return frozenset(name for pair in self.channels for name in pair)
+        return _coordinates(self.first, len(self.names))
 
     def law(self, sample: Sample):
         return tuple(reading(sample, rest) for rest, _ in self.channels)
 
     def impulse(self, sample: Sample):
         return tuple(reading(sample, momentum) for _, momentum in self.channels)
+
+
+@cache
+def _channels(first: int, count: int) -> tuple[tuple[str, str], ...]:
+    return tuple(channels_of(first + i) for i in range(count))
+
+
+@cache
+def _coordinates(first: int, count: int) -> frozenset[str]:
+    return frozenset(name for pair in _channels(first, count) for name in pair)
 
 
 def channels_of(number: int) -> tuple[str, str]:
