@@ -56,6 +56,8 @@ _KINDS: tuple[Mapping[str, float], ...] = (
 )  # fmt: skip
 TORQUES = frozenset(next(kind for kind in _KINDS if "N·m" in kind))
 """Units of torque."""
+CURRENTS = frozenset(next(kind for kind in _KINDS if "A" in kind))
+"""Units of current."""
 
 
 def factor(unit: str, other: str) -> float | None:

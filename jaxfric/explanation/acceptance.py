@@ -4,11 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..models import Model
 from ..terms.effect import Effect
+from .baseline import refitted
 from .evidence import Evidence
 from .predictions import with_predictions
 from .problem import BETWEEN, LEAST_SHARE, LINEARITY, OtherRows
-from .regression import Fit, fast, fit
+from .regression import Fit, fast, fit, freed
 from .selection import SelectedTerm
 from .significance import DRAWS, LEVEL
 from .trials import Contest, Finalist, Trial
@@ -43,9 +45,12 @@ NEARLY_ALL = 0.75
 
 def accepted(
     round_: Contest, current: Fit, evidence, others: OtherRows, base: Fit,
-    selected: list[SelectedTerm],
+    selected: list[SelectedTerm], given: Model | None = None,
 ) -> Finalist | None:  # fmt: skip
-    """The best finalist that passes, beside the terms selected before; `None` if none does."""
+    """The best finalist that passes, beside the terms selected before; `None` if none does.
+
+    `given`: the model whose values the base keeps, where it does.
+    """
     least = _least_share(selected)
     for finalist in round_.finalists:
         effect, term = finalist.effect, finalist.trial.candidate.term
@@ -57,10 +62,10 @@ def accepted(
         if not (finalist.score > 0 and finalist.p_value <= level and enough):
             continue
         derived = effect.sharp or term.swings
-        if derived and not _confirmed(finalist, current, others, least):
+        if derived and not _confirmed(finalist, current, others, least, given):
             continue
         if (derived or effect.at_reversals) and of_smoothing(
-            finalist, current, others.rougher(), least
+            finalist, current, others.rougher(), least, given
         ):
             continue
         return finalist
@@ -123,7 +128,9 @@ def _again(finalist: Finalist, selected: list[SelectedTerm]) -> bool:
 HALF = 0.5
 
 
-def _confirmed(finalist: Finalist, current: Fit, others: OtherRows, least: float) -> bool:
+def _confirmed(
+    finalist: Finalist, current: Fit, others: OtherRows, least: float, given: Model | None
+) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 
     There the noise of the derivatives is 2⁵ to 2⁷ times weaker in power, the physics hardly. But a
@@ -132,12 +139,12 @@ def _confirmed(finalist: Finalist, current: Fit, others: OtherRows, least: float
     kernel of 4/3 of the width will do.
     """
     between, wide, _ = others
-    if wide is None or _alike(finalist, current, wide, 2.0, least):
+    if wide is None or _alike(finalist, current, wide, 2.0, least, given):
         return True
     term = finalist.trial.candidate.term
     most = current.energy - finalist.energy >= HALF * current.energy
     loud = term.swings and most and between is not None
-    return loud and _alike(finalist, current, between, BETWEEN, least)
+    return loud and _alike(finalist, current, between, BETWEEN, least, given)
 
 
 # Between a force that is as large and one that is two thirds as much.
@@ -145,22 +152,27 @@ SMOOTHED = 2**0.5
 
 
 def of_smoothing(
-    finalist: Finalist, current: Fit, rougher: Evidence | None, least: float = LATER_SHARE
-) -> bool:
+    finalist: Finalist, current: Fit, rougher: Evidence | None, least: float = LATER_SHARE,
+    given: Model | None = None,
+) -> bool:  # fmt: skip
     """Whether a term is not the same where the velocity is smoothed over less.
 
     What smoothing takes off the velocity looks like a load on a spring, and is a fifth as much
     there; near a stop within a count it looks like a friction that lags, and is two thirds as much.
     """
-    return rougher is not None and not _alike(finalist, current, rougher, SMOOTHED, least)
+    return rougher is not None and not _alike(finalist, current, rougher, SMOOTHED, least, given)
 
 
-def _alike(finalist: Finalist, current: Fit, wide: Evidence, factor: float, least: float) -> bool:
+def _alike(
+    finalist: Finalist, current: Fit, wide: Evidence, factor: float, least: float,
+    given: Model | None,
+) -> bool:  # fmt: skip
     """Whether a term has the same size, within a factor, through a kernel as much wider.
 
     A column of noise changes by more.
     """
-    less = fit(current.terms, with_predictions(wide, current), current.betas, 4)
+    less = refitted(wide, current, given, (), 4)
+    less = less if given is None else freed(less, ())
     seen = with_predictions(wide, less)
     # At the β of the narrow kernel: where the wide one leaves little, it would find another.
     term, beta, basis = finalist.trial.candidate.term, finalist.betas[-1], less.basis()

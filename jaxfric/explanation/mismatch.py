@@ -47,8 +47,9 @@ class Mismatch(NamedTuple):
 
 
 def mismatch(
-    model: Model, refitted: Fit, evidence: Evidence, wide: Evidence | None = None, seed: int = 0
-) -> Mismatch | None:
+    model: Model, refitted: Fit, evidence: Evidence, wide: Evidence | None = None, seed: int = 0,
+    recorded: int = 1,
+) -> Mismatch | None:  # fmt: skip
     """Which of a model's values are wrong on a recording; `None` if none is.
 
     `refitted`: with all values free, beside the terms found: values and missing physics are tested
@@ -57,7 +58,8 @@ def mismatch(
     is known to follow its law, and beside laws, which have not quite the shape of their effect, as
     much is needed as of a later term. Of those the fewest are moved that leave no more than all of
     them do, but for what no sensor of force resolves. `wide`: rows through a kernel of twice the
-    width, which have to show them too.
+    width, which have to show them too; `recorded`: in how many recordings, 2 where the values are
+    of an earlier one, each by its own sensor of force.
     """
     given, first = as_given(model, refitted, evidence), at_values(model, evidence).energy
     residual, own, beside = apart(model, refitted, evidence)
@@ -73,7 +75,7 @@ def mismatch(
     if not gained > least or p_value > LEVEL:
         return None
     before = [*given.alphas[0], *given.betas[0]]
-    enough = LINEARITY**2 * float(evidence.force @ evidence.force)
+    enough = recorded * LINEARITY**2 * float(evidence.force @ evidence.force)
     free = fewest(own, residual, block, enough)
     if free and wide is not None and len(free) <= MOST_WRONG:
         free = _lasting(model, refitted, wide, free, solve(own[:, free], residual))

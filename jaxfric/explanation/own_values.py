@@ -85,7 +85,8 @@ def _wrong(known: Baseline, findings: Findings, seed: int) -> Mismatch | None:
     if known.model is None:
         return None
     problem, selection = findings.undelayed
-    wrong = mismatch(known.model, selection.last, problem.evidence, problem.wide, seed)
+    recorded = 1 if known.errors is None else 2
+    wrong = mismatch(known.model, selection.last, problem.evidence, problem.wide, seed, recorded)
     wrong = None if wrong is None else with_factor(known, findings.undelayed, wrong)
     if wrong is None or wrong.factor is not None or known.errors is None:
         return wrong

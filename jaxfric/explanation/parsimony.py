@@ -82,7 +82,7 @@ def _one(model: Model, findings: Findings, beside: _Beside, most: int) -> Findin
     problem, selection = findings.recorded
     given, evidence, round_ = beside
     round_ = round_._replace(finalists=[f for f in round_.finalists if _numbers(f) < most])
-    best = accepted(round_, given, evidence, problem.other_rows, given, [])
+    best = accepted(round_, given, evidence, problem.other_rows, given, [], model)
     if best is None:
         return None
     best, rivals = with_rivals(simplest(best, round_), round_, given, evidence)

@@ -215,7 +215,8 @@ def wrong_values(values, wrong: Mismatch, known: Baseline, better: Improved) -> 
     elif other is not None:
         told = changed_sentence(moved, wrong.share, other, wrong.rivals)
     else:
-        told = mismatch_sentence(moved, wrong.share, wrong.rivals)
+        unit = better.findings.problem.evidence.motion.unit_names["force"]
+        told = mismatch_sentence(moved, wrong.share, wrong.rivals, unit)
     separate_by = " ".join(dict.fromkeys(EFFECTS[rival].separate_by for rival in wrong.rivals))
     instead = {names[i]: tuple(names[j] for j in others) for i, others in wrong.instead.items()}
     return Finding(

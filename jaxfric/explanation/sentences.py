@@ -12,7 +12,7 @@ from ..terms.effect import ANY, Effect, Extent
 from ..terms.effects import EFFECTS
 from ..terms.effects.parameter_mismatch import MISMATCH
 from ..terms.slow import CHANGES
-from ..units import FORCE
+from ..units import CURRENTS, FORCE
 from .fewest import SURE
 from .quantities import UNSEEN, nil, quantity, turns, unseen
 
@@ -162,12 +162,12 @@ def _more(estimate: Estimate) -> str:
     return f"{size} {'more' if estimate.value > 0 else 'less'}"
 
 
-def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
-    """Wrong values of the baseline as a sentence."""
+def mismatch_sentence(moved, share: float, rivals: Sequence[str] = (), unit: str = "") -> str:
+    """Wrong values of the baseline as a sentence; `unit` of the force."""
     parts = []
     for name, m in moved.items():
         if name == GAIN and not m.before:
-            parts.append(_times(m.estimate._replace(value=1 + m.value)))
+            parts.append(_times(m.estimate._replace(value=1 + m.value), unit))
         elif m.before:
             parts.append(f"{_spoken(name)} is {quantity(m.estimate)}, not {m.before:.4g}")
         else:
@@ -177,7 +177,7 @@ def mismatch_sentence(moved, share: float, rivals: Sequence[str] = ()) -> str:
     return f"{text}{indistinct(rivals)}."
 
 
-def _times(factor: Estimate) -> str:
+def _times(factor: Estimate, unit: str) -> str:
     """The recorded force as a multiple of the simulator's; of another sign where it is negative."""
     size = quantity(factor._replace(value=abs(factor.value), unit=""))
     if factor.value < 0:
@@ -185,7 +185,17 @@ def _times(factor: Estimate) -> str:
             f"the recorded force has the opposite sign, and {size} times the size of the "
             "simulator's: turn one of them round (--scale force=-1)"
         )
+    if unit in CURRENTS:
+        return f"the recorded current is {size} times the simulator's: {of_constant(factor)}"
     return f"the recorded force (the torque constant) is {size} times the simulator's"
+
+
+def of_constant(factor: Estimate) -> str:
+    """The torque constant of a drive whose current is so many times the simulator's, in words."""
+    value = 1 / float(factor.value)
+    error = float(factor.standard_error) * value**2
+    constant = factor._replace(value=np.float64(value), standard_error=np.float64(error), unit="")
+    return f"the torque constant is {quantity(constant)} of what that takes it for"
 
 
 def spoken(name: str) -> str:

@@ -124,16 +124,31 @@ def find(parts: Sequence[Part], zeros: bool = True) -> FaultSearch:
 
 
 def _found(parts: Sequence[Part], recorded: list[Rows], faults: Faults) -> FaultSearch:
-    """Where a search that begins with some faults ends; zeros only where gravity explains no more.
+    """Where a search that begins with some faults ends; zeros only where gravity explains no more,
+    nor a body that is another one anyway.
 
     A joint feels a tilt of its base as a wrong zero, and other values make up for what the others
-    feel of it.
+    feel of it. A load beside the middle of a link turns that link's centre of mass, as a zero does.
     """
     seen = _searched(parts, recorded, faults)
     if not seen.faults.zeros:
         return seen
     other = _searched(parts, recorded, faults, gravity=True)
-    return other if _explains_more(other, seen, recorded) else seen
+    if _explains_more(other, seen, recorded):
+        return other
+    plain = _searched(parts, recorded, faults, zeros=False)
+    return plain if _says_as_much(plain, seen, recorded) else seen
+
+
+def _says_as_much(plain: FaultSearch, seen: FaultSearch, recorded: Sequence[Rows]) -> bool:
+    """Whether values alone explain as much as zeros and values, by no more numbers, and of no other
+    bodies: then one thing is wrong, and not two.
+    """
+    bodies = {name.split("/")[1] for name in seen.chosen if name.startswith("body/")}
+    more = set(plain.chosen) - set(seen.chosen)
+    same = all(name.startswith("body/") and name.split("/")[1] in bodies for name in more)
+    enough = _enough(recorded) / max(_energy(recorded), 1e-300)
+    return same and plain.numbers <= seen.numbers and plain.left < seen.left + enough
 
 
 def _explains_more(other: FaultSearch, seen: FaultSearch, recorded: Sequence[Rows]) -> bool:
@@ -152,15 +167,16 @@ def _explains_more(other: FaultSearch, seen: FaultSearch, recorded: Sequence[Row
 
 
 def _searched(
-    parts: Sequence[Part], recorded: list[Rows], faults: Faults, gravity: bool = False
-) -> FaultSearch:
+    parts: Sequence[Part], recorded: list[Rows], faults: Faults, gravity: bool = False,
+    zeros: bool = True,
+) -> FaultSearch:  # fmt: skip
     """Where a search that begins with some faults ends; the rows as `recorded` say what they are
-    better than. `gravity`: whether that is among the values that may be wrong.
+    better than. `gravity`, `zeros`: whether these are among what may be wrong.
     """
     rows, before = _put_right(parts, recorded, faults), _energy(recorded)
     known = {OFFSET} if faults.late else set[str]()
     pulls = by_gravity(parts) if gravity else {}
-    stack = _stack(parts, rows, faults, pulls)
+    stack = _stack(parts, rows, faults, pulls, zeros)
     chosen = _chosen(stack, rows)
     for _ in range(ROUNDS):
         new = _new(stack, chosen)
@@ -168,13 +184,13 @@ def _searched(
             break
         if not (known := known | new):
             break
-        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls)
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls, zeros)
         chosen = _chosen(stack, rows)
     if known:
-        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls)
+        faults, rows, stack = _refined(parts, rows, faults, sorted(known), chosen, pulls, zeros)
     if _energy(rows) > before or not _matters(faults, parts):
         faults, rows = Faults(), recorded
-        stack = _stack(parts, rows, faults, pulls)
+        stack = _stack(parts, rows, faults, pulls, zeros)
     left = energy(stack, chosen) / max(before, 1e-300)
     beside = [name for name in chosen if not _is_fault(name)]
     names = [n for n in stack.names if _is_fault(n) or n.endswith(": gain")]
@@ -200,20 +216,20 @@ def _new(stack: Stack, chosen: Sequence[str]) -> set[str]:
 
 def _refined(
     parts: Sequence[Part], rows: list[Rows], faults: Faults, names: list[str], chosen,
-    pulls: Changes,
+    pulls: Changes, zeros: bool,
 ) -> tuple[Faults, list[Rows], Stack]:  # fmt: skip
     """Some faults fitted beside the other wrong values, by Gauss-Newton."""
     beside = [name for name in chosen if name not in names and not _is_fault(name)]
     # A part of a sample between force and motion is no fault, and no other value's either.
     beside += [OFFSET] * (OFFSET not in names)
-    stack = _stack(parts, rows, faults, pulls)
+    stack = _stack(parts, rows, faults, pulls, zeros)
     for _ in range(ROUNDS):
         values = estimate(stack, [*beside, *names])
         steps = {name: values[name][0] for name in names}
         faults = _moved(faults, steps)
         faults = faults._replace(errors={name: values[name][1] for name in names})
         rows = _put_right(parts, rows, faults)
-        stack = _stack(parts, rows, faults, pulls)
+        stack = _stack(parts, rows, faults, pulls, zeros)
         if all(abs(step) < CLOSE * values[name][1] for name, step in steps.items()):
             break
     return faults, rows, stack
@@ -289,10 +305,12 @@ def put_right(recording: Recording, faults: Faults) -> Recording:
     return dataclasses.replace(recording, force=np.asarray(moved).astype(kind), mask=mask)
 
 
-def _stack(parts: Sequence[Part], rows: Sequence[Rows], faults: Faults, pulls: Changes) -> Stack:
+def _stack(
+    parts: Sequence[Part], rows: Sequence[Rows], faults: Faults, pulls: Changes, zeros: bool
+) -> Stack:
     """The simulator's own columns first: what they can say as well is theirs; then what `pulls`."""
     columns = []
-    changes = by_zero(parts, faults.zeros)
+    changes = by_zero(parts, faults.zeros) if zeros else {}
     for part, own in zip(parts, rows, strict=True):
         some = {_shared(name, part.name): own.own[:, i] for i, name in enumerate(own.names)}
         for name, change in pulls.get(part.name, {}).items():

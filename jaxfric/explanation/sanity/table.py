@@ -11,8 +11,10 @@ from ...terms.effects.end_stop import END_STOP, place
 from ...terms.effects.force_limit import FORCE_LIMIT
 from ...terms.effects.late import CLOCK, SENSOR_FILTER
 from ...terms.effects.position_zero import POSITION_ZERO
+from ...units import CURRENTS
 from ..acceptance import LINEARITY
 from ..quantities import quantity
+from ..sentences import of_constant
 from . import limits
 from .contact import Contact
 from .faults import DRIFT, LEAVES, OFFSET, ZERO, FaultSearch
@@ -92,6 +94,10 @@ def _gain(part: Part, seen: FaultSearch) -> list[Check]:
     if chosen and told:
         unit = _unit(1 + value)
         text = f"The torque constant is {size} times the simulator's{unit}."
+        if part.recording.unit_names["force"] in CURRENTS:
+            text = (
+                f"The current is {size} times the simulator's{unit or f': {of_constant(times)}'}."
+            )
         return [
             Check("force_sign", "The force has the simulator's sign."),
             Check("force_gain", text, True, bool(unit), value=times, parameter="gain"),
