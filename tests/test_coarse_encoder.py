@@ -68,7 +68,7 @@ def test_a_law_that_is_smaller_where_the_velocity_is_smoothed_over_less_is_of_sm
     """Of a motion through a wide polynomial and a narrow one: what is two thirds as much goes."""
     shares = {"as large": 1.0, "two thirds": 0.66, "a fifth": 0.2}
 
-    def alike(finalist, current, rows, factor, least):
+    def alike(finalist, current, rows, factor, least, given):
         return 1 / factor < shares[rows] < factor
 
     monkeypatch.setattr(acceptance, "_alike", alike)

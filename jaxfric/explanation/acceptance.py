@@ -129,7 +129,7 @@ HALF = 0.5
 
 
 def _confirmed(
-    finalist: Finalist, current: Fit, others: OtherRows, least: float, given: Model | None
+    finalist: Finalist, current: Fit, others: OtherRows, least: float, given: Model | None = None
 ) -> bool:
     """Whether a term is the same through a kernel of twice the width.
 

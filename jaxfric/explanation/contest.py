@@ -5,6 +5,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from ..terms.effect import Effect
+from .acceptance import RAREST
 from .candidates import CandidateSet, at_frequencies, scaled, tones
 from .evidence import Evidence
 from .many_minima import BEYOND_CHANCE, noise, promise
@@ -67,9 +68,11 @@ def contest(
     within_reach = any(gain >= needed(t) for t, gain in zip(eligible, most, strict=True))
 
     def retested(found: Finalist) -> float:
-        """The p-value of a load that is stepped, found beside its grid."""
+        """The p-value of what was found beside its grid."""
         candidate = found.trial.candidate
-        number = next(i for i, each in enumerate(candidates) if each is candidate)
+        number = next((i for i, each in enumerate(candidates) if each is candidate), None)
+        if number is None:  # no grid
+            return found.trial.p_value
         [grid] = field.columns([candidate], seen)
         own = scaled(seen.columns(candidate.term, found.betas[-1][None]))
         columns = np.concatenate([grid, own])
@@ -120,8 +123,10 @@ def _finals(
         trial, gain = found.trial, 1 - found.energy / current.energy
         p_value = LEVEL if gain > trial.threshold else 1.0
         p_value = min(trial.p_value, p_value)
-        if p_value > LEVEL and gain >= MOSTLY and trial.candidate.term.stepped:
-            p_value = retested(found)
+        # A law whose peak is narrower than the grid's steps: a load in a gap, a light ring that is
+        # swept through. The grid's best point leaves much more than noise.
+        if p_value > RAREST and gain >= MOSTLY:
+            p_value = min(p_value, retested(found))
         return found._replace(score=trial.score(gain, size), p_value=p_value)
 
     # What takes longest comes first, so that no thread waits for another at the end.

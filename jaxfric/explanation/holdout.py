@@ -6,7 +6,7 @@ the held-out recording is reported as not confirmed, and the model does without 
 
 from ..data.recording import Recording
 from . import parameters as spelled, verification
-from .acceptance import LINEARITY
+from .acceptance import HALF, LINEARITY
 from .baseline import as_given
 from .figures import Figures
 from .findings import Findings, Solution
@@ -48,7 +48,10 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     findings = _rephased(_with_rows(better.findings, holdout))
     nil = _nil(findings)
     borne = [_borne_out(findings, number) for number in range(len(nil))]
-    borne = [each and not none for each, none in zip(borne, nil, strict=True)]
+    borne = [
+        each and not (none and not _borne_out(findings, number, HALF))
+        for number, (each, none) in enumerate(zip(borne, nil, strict=True))
+    ]
     findings = findings.with_selected([
         selected._replace(confirmed=each)
         for selected, each in zip(findings.selection.selected, borne, strict=True)
@@ -149,16 +152,19 @@ def _rephased(findings: Findings) -> Findings:
     return findings
 
 
-def _borne_out(findings: Findings, number: int) -> bool | None:
-    """Whether the model with a finding is nearer to the held-out recording than without it.
+def _borne_out(findings: Findings, number: int, part: float = 1.0) -> bool | None:
+    """Whether the model with a finding is nearer to the held-out recording than without it, and
+    leaves no more than a part of the energy.
 
-    `None` for what no other recording can say.
+    `None` for what no other recording can say. Values that make up for each other, as the frequency
+    of a light ring for how late the force is, may each be none by its interval; but what halves
+    what is left of another recording, with nothing refitted, is not.
     """
     if findings.selection.selected[number].effect.momentary or not _acts_there(findings, number):
         return None
     less = findings.fit_without(number)
     without, with_it = findings.holdout_residuals(less, number)
-    return verification.nearer(with_it, without)
+    return verification.nearer(with_it, without, part)
 
 
 def _acts_there(findings: Findings, number: int) -> bool:

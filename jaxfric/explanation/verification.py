@@ -166,15 +166,16 @@ def part(current: Fit, evidence: Evidence, number: int) -> float:
     return float(np.linalg.norm(force)) / max(float(np.linalg.norm(seen.force)), 1e-300)
 
 
-def nearer(more: np.ndarray, less: np.ndarray) -> bool:
-    """Whether the residual of `more` is smaller than that of `less`, N, both `(J,)`.
+def nearer(more: np.ndarray, less: np.ndarray, part: float = 1.0) -> bool:
+    """Whether the residual of `more` is smaller than that of `less`, or than a part of its energy,
+    N, both `(J,)`.
 
     Both are cut off at four standard deviations, by the median: isolated events of a recording say
     nothing about a term.
     """
     limit = 4 * np.median(np.abs(more)) / 0.6745
     ours, theirs = (np.minimum(np.abs(r), limit) for r in (more, less))
-    return bool(np.sum(theirs**2) > np.sum(ours**2))
+    return bool(part * np.sum(theirs**2) > np.sum(ours**2))
 
 
 def residuals(

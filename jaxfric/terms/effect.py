@@ -40,6 +40,15 @@ class View(NamedTuple):
     asymmetry: float = 0.0
     turn: float = 0.0
 
+    def with_turns(self, periods: np.ndarray) -> np.ndarray:
+        """Periods of parts of the stroke, the longest first, and a revolution and half of one where
+        these are shorter: what sits on a motor of many turns is off once in each (an encoder off
+        centre), or twice (a resolver of unequal windings, a crank).
+        """
+        if not 0 < self.turn < periods[-1]:
+            return periods
+        return np.append(periods, self.turn / np.array([1.0, 2.0]))
+
 
 class Waves(NamedTuple):
     """A law that is a wave over a coordinate: its grid is the spectral lines of a recording.

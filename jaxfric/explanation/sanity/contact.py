@@ -84,6 +84,9 @@ def _at_end(recording: Recording, upper: bool) -> Contact | None:
     pressed = pressed[outward[pressed] >= end]
     if len(pressed) < FEWEST or elsewhere > STRAY * len(pressed):
         return None
+    gradual = _gradual(recording, outward, excess, valid, (far - near) / STEEP, pressed)
+    if np.count_nonzero(excess[pressed] > most + gradual) < FEWEST:
+        return None
     rise = 1 - most / excess[pressed].max()
     if not rise * (far - near) > STEEP * 2 * (far - outward[pressed].min()):
         return None
@@ -103,6 +106,23 @@ def _at_end(recording: Recording, upper: bool) -> Contact | None:
         return None
     power = float(np.sum(excess[beyond] ** 2) / np.sum(excess[valid] ** 2))
     return contact._replace(samples=int(np.count_nonzero(beyond)), share=power)
+
+
+def _gradual(
+    recording: Recording, outward: np.ndarray, excess: np.ndarray, valid: np.ndarray, width: float,
+    pressed: np.ndarray,
+) -> float:  # fmt: skip
+    """What a force that rises on the way there is at the place, N, by a straight line over the last
+    `width`, m, in slip: a bumper on which the axis stands is no block.
+    """
+    edge = outward[pressed].min()
+    slips = valid & in_motion(recording) & (np.gradient(outward) > 0)
+    slips &= (outward > edge - width) & (outward < edge)
+    if np.count_nonzero(slips) < FEWEST:
+        return 0.0
+    columns = np.stack([np.ones(np.count_nonzero(slips)), outward[slips] - edge], axis=1)
+    there, slope = np.linalg.lstsq(columns, excess[slips], rcond=None)[0]
+    return max(float(there), 0.0) if slope > 0 else 0.0
 
 
 def _friction(recording: Recording, force: np.ndarray, where: np.ndarray) -> float:

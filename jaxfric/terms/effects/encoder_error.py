@@ -63,9 +63,7 @@ class EncoderError(AbstractLaw):
         )
 
 
-# An encoder is off once in a revolution of what it sits on, of a motor that is many in a stroke;
-# and twice, as a resolver of unequal windings.
-_MOST, _OF_TURN = 16, (1.0, 0.5)
+_MOST = 16
 # Viscous friction by what the inertia takes, about the usual speed and acceleration.
 _VISCOUS = 0.1, 0.5, 2.5
 
@@ -74,9 +72,7 @@ def _places(term: AbstractTerm, view: View) -> np.ndarray:
     """Periods from one stroke to a sixteenth of it, a quarter of a cycle apart, and of an axis that
     turns a revolution and half of one, for three rates.
     """
-    periods = float(view.limits.high - view.limits.low) / np.arange(1, _MOST, 0.25)
-    if 0 < view.turn < periods[-1]:
-        periods = np.append(periods, view.turn * np.array(_OF_TURN))
+    periods = view.with_turns(float(view.limits.high - view.limits.low) / np.arange(1, _MOST, 0.25))
     low, high = (float(end) for end in _rates(view.limits))
     usual = view.acceleration / max(view.speed, 1e-300)
     rates = np.unique(np.clip(np.multiply(_VISCOUS, usual), low, high))

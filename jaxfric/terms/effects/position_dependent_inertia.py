@@ -46,10 +46,12 @@ class PositionDependentInertia(AbstractLaw):
 
 
 def periods(term: AbstractTerm, view: View) -> np.ndarray:
-    """From eight strokes to an eighth of one."""
+    """From eight strokes to an eighth of one, and of an axis that turns, as a crank does, a
+    revolution and half of one.
+    """
     stroke = view.limits.high - view.limits.low
     cycles = np.concatenate([2.0 ** np.arange(-3, 0, 0.5), np.arange(1, 8, 0.25)])
-    return (stroke / cycles)[:, None]
+    return view.with_turns(stroke / cycles)[:, None]
 
 
 POSITION_DEPENDENT_INERTIA = Effect(
