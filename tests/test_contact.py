@@ -75,6 +75,25 @@ def test_a_stop_is_found_at_its_place_on_its_side(way, unit):
     assert contact.share > 0.9
 
 
+def test_a_bumper_on_which_the_axis_stands_is_no_block():
+    """It is pressed there by the bumper and by friction that holds it: more than friction alone."""
+    wanted = np.interp(
+        TIME % 4.0, [0.0, 0.5, 1.5, 2.0, 2.5, 3.5, 4.0], [0.0, 0.5, 0.55, 0.5, 0.0, -0.5, 0.0]
+    )
+    kernel = np.hanning(301) / np.hanning(301).sum()
+    position = np.convolve(np.pad(wanted, 150, "edge"), kernel, "valid")
+    position = np.minimum(position, 0.5)  # it stands there for a while
+    speed = np.gradient(position, TIME)
+    known = INERTIA * np.gradient(speed, TIME) + COULOMB * np.sign(speed)
+    bumper = 20.0 * np.maximum(position - 0.4, 0.0)
+    standing = (position > 0.4999) & (np.abs(speed) < 1e-3)
+    pressed = known + bumper + np.where(standing, COULOMB, 0.0)
+    assert (pressed - known)[standing].min() > 2 * COULOMB
+    assert not contacts(log(position, pressed, known))
+    blocked = known + np.where(standing, 6 * COULOMB, 0.0)
+    assert contacts(log(position, blocked, known))
+
+
 def test_a_place_that_the_axis_passes_at_other_times_blocks_nothing():
     position, _ = driven()
     position = np.concatenate([position, position[::-1]])[::2]  # there twice

@@ -8,8 +8,9 @@ import pytest
 from jaxfric import Recording, explain, terms
 from jaxfric.explanation.sentences import told
 from jaxfric.identification.uncertainty import Estimate
-from jaxfric.terms.effect import Extent
+from jaxfric.terms.effect import Extent, View
 from jaxfric.terms.effects import EFFECTS
+from jaxfric.terms.sample import Scales
 
 
 def axis(mass, coulomb, viscous, stroke, unit=("N", "m"), seed=0, *, off=(0.0, 1.0),
@@ -112,3 +113,42 @@ def test_an_encoder_of_a_motor_that_turns_many_times_is_told():
     (finding,) = answer.findings
     assert finding.effect == "encoder_error" and answer.verdict == "explained"
     assert float(finding.parameters["encoder_error"].value) == pytest.approx(0.006, rel=0.02)
+
+
+def test_periods_of_what_turns_are_looked_for():
+    """Of a motor of sixty turns a revolution and half of one, which are no part of the stroke."""
+    for name in ("encoder_error", "position_dependent_inertia"):
+        effect = EFFECTS[name]
+        turning, sliding = (
+            effect.grid(effect.laws[0](), view(60 * 2 * np.pi, turn)) for turn in (2 * np.pi, 0.0)
+        )
+        there = {round(float(place[0]), 6) for place in turning}
+        there -= {round(float(place[0]), 6) for place in sliding}
+        assert there == {round(2 * np.pi, 6), round(np.pi, 6)}
+
+
+def view(stroke, turn):
+    limits = Scales(*(1.0,) * len(Scales._fields))
+    limits = limits._replace(low=0.0, high=stroke, duration=20.0, interval=1e-3)
+    return View(limits, 0.01, 10_000, 10.0, 50.0, turn=turn)
+
+
+@pytest.mark.slow
+def test_an_inertia_that_varies_with_each_turn_is_no_encoder_off_centre():
+    """A crank, twice in a revolution, of an axis that goes one way for sixty of them."""
+    runs = []
+    for seed in (0, 1):
+        time = np.arange(0.0, 16.0, 1e-3)
+        slow, fast = 2 * np.pi * (0.23 + 0.04 * seed), 2 * np.pi * 0.9
+        speed = 14 + 8 * np.sin(slow * time) + 3.5 * np.sin(fast * time + seed)
+        rate = 8 * slow * np.cos(slow * time) + 3.5 * fast * np.cos(fast * time + seed)
+        x = np.cumsum(speed) * 1e-3
+        inertia, slope = 0.042 - 0.009 * np.cos(2 * x - 0.4), 0.018 * np.sin(2 * x - 0.4)
+        force = inertia * rate + 0.5 * slope * speed**2 + 0.5 + 0.06 * speed
+        force += 0.05 * np.random.default_rng(seed).normal(size=len(time))
+        runs.append(Recording(time, force, x, units={"force": "N·m", "position": "rad"}))
+    answer = explain(runs[0], "coulomb-viscous", runs[1])
+    (finding,) = answer.findings
+    assert finding.effect == "position_dependent_inertia" and answer.verdict == "explained"
+    assert float(finding.parameters["amplitude"].value) == pytest.approx(0.009, rel=0.01)
+    assert float(finding.parameters["inertia_period"].value) == pytest.approx(np.pi, rel=1e-4)

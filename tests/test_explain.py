@@ -1657,6 +1657,19 @@ def test_a_wrong_value_shows_through_a_wider_kernel_too(healthy):
     assert mismatch.mismatch(known, *posed, as_known.wide) is None
 
 
+def test_what_two_sensors_do_not_resolve_has_not_changed(healthy):
+    """A change of 1.2 times what one sensor of force resolves is below what two do, 1.4 times."""
+    run = healthy[0]
+    force = np.asarray(run.force)
+    known = models.from_parameters(models.gaussian(), PARAMETERS)
+    speed = np.gradient(np.asarray(run.position), TIME)
+    size = 1.2 * problem.LINEARITY * np.sqrt(np.mean(force**2) / np.mean(speed**2))
+    posed = problem.problem_of(dataclasses.replace(run, force=run.force + size * speed), known.term)
+    rows = posed.base, posed.evidence, posed.wide
+    assert mismatch.mismatch(known, *rows) is not None
+    assert mismatch.mismatch(known, *rows, recorded=2) is None
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("drags", [True, False])
 def test_one_effect_stands_for_several_wrong_values_where_it_says_as_much(healthy, drags):

@@ -230,6 +230,15 @@ def test_a_small_share_is_no_nothing():
     )
 
 
+def test_a_larger_current_is_a_smaller_torque_constant():
+    """1/1.0887 is 0.9185."""
+    gain = {"gain": moved(0.0887, 0.001, 0.0)}
+    text = mismatch_sentence(gain, 0.9, unit="mA")
+    assert "current is 1.0887 ± 0.0020 times the simulator's" in text
+    assert "the torque constant is 0.9185 ± 0.0017 of what that takes it for" in text
+    assert "(the torque constant) is 1.0887" in mismatch_sentence(gain, 0.9, unit="N·m")
+
+
 def test_a_delay_that_may_be_none_is_at_most_so_long():
     text = sentence("transport_delay", {"delay": estimate(0.7e-3, 0.4e-3, "s")}, 0.5, ())
     assert "acts at most 1.5 ms late" in text
