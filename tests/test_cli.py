@@ -238,6 +238,8 @@ def test_simulate_follows_a_set_point_or_a_force(saved, tmp_path, capsys):
 def test_units_that_disagree_are_refused(saved, axis, tmp_path, capsys):
     out = tmp_path / "force.csv"
     assert main(["predict", saved, axis, "-o", str(out), "--units", "force=kN"]) == 2
+    assert "--scale force=1000 --units force=N" in " ".join(capsys.readouterr().err.split())
+    assert main(["predict", saved, axis, "-o", str(out), "--units", "force=A"]) == 2
     assert "--scale force=FACTOR" in capsys.readouterr().err
     assert not out.exists()
 
