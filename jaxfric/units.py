@@ -66,6 +66,12 @@ def factor(unit: str, other: str) -> float | None:
     return None if kind is None else kind[unit] / kind[other]
 
 
+def written_factor(unit: str, other: str) -> str:
+    """[`factor`][] as `--scale` takes it, or the word FACTOR where it is not known."""
+    times = factor(unit, other)
+    return "FACTOR" if times is None else f"{times:.12g}"
+
+
 def check_same(
     ours: Mapping[str, str], theirs: Mapping[str, str], name: str, other: str, option: str = "scale"
 ) -> None:
@@ -84,7 +90,7 @@ def check_same(
         times = factor(unit, wanted)
         if unit == wanted or (times is None and SI[quantity] in (unit, wanted)):
             continue
-        number = "FACTOR" if times is None else f"{times:.12g}"
+        number = written_factor(unit, wanted)
         raise ValueError(
             f"{other}: {quantity} is in {unit}, but in {wanted} in {name}, and both are to be "
             f"compared. Convert: --{option} {quantity}={number} (in Python, jf.read(..., "

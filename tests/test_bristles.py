@@ -1,6 +1,7 @@
 """Bristles: Dahl's and LuGre's friction as a state of the plant, and their stiffness from data."""
 
 import json
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import jaxfric as jf
 from jaxfric.cli import main
+from jaxfric.identification.presliding import KINDS, Kind, Presliding, doubt
 from jaxfric.models import Model
 
 STEP = 1e-3
@@ -167,6 +169,30 @@ def test_bristles_are_saved_and_said_at_export():
         assert any("bristles" in remark for remark in export(axis, target).remarks)
     with pytest.raises(ValueError, match="stiffness"):
         axis.with_bristles(-1.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "left", "inertia", "said"),
+    [
+        ("not_passive", "dahl", 0.01, 5.0, ""),
+        ("not_described", "lugre", 0.01, 5.0, ""),
+        ("not_passive", "dahl", 0.01, -5.0, "not_passive: "),
+        ("not_passive", "dahl", 0.8, 5.0, "not_described: "),
+        ("not_passive", "jump", 0.01, 5.0, "not_passive: of friction that jumps"),
+        ("on_border", "dahl", 0.01, 5.0, "on_border: of friction that jumps"),
+        ("successful", "jump", 0.01, 5.0, ""),
+    ],
+)
+def test_friction_beside_bristles_is_judged_with_them(name, kind, left, inertia, said):
+    """Friction that jumps may seem to drive an axis whose friction bends."""
+    found = SimpleNamespace(result_name=name, diagnosis="of friction that jumps")
+    model = jf.scenario.machine().with_parameters({"inertia": inertia})
+    errors = dict.fromkeys(model.parameters, 0.1)
+    kinds = tuple(Kind(each, left, 0.0 if each == kind else 100.0) for each in KINDS)
+    test = Presliding(None, None, 1e-5, 1.0, "", model, errors, kinds)
+    assert test.kind == kind
+    against = doubt(test, found)
+    assert against.startswith(said) and bool(against) == bool(said)
 
 
 @pytest.mark.slow

@@ -238,6 +238,8 @@ def test_simulate_follows_a_set_point_or_a_force(saved, tmp_path, capsys):
 def test_units_that_disagree_are_refused(saved, axis, tmp_path, capsys):
     out = tmp_path / "force.csv"
     assert main(["predict", saved, axis, "-o", str(out), "--units", "force=kN"]) == 2
+    assert "--scale force=1000 --units force=N" in " ".join(capsys.readouterr().err.split())
+    assert main(["predict", saved, axis, "-o", str(out), "--units", "force=A"]) == 2
     assert "--scale force=FACTOR" in capsys.readouterr().err
     assert not out.exists()
 
@@ -305,9 +307,11 @@ def test_a_motionless_axis_leaves_no_model(tmp_path, capsys):
     io.write_table(path, columns | {"velocity": still})
     out, saved = tmp_path / "out.json", tmp_path / "model.json"
     closed = ("--projection", "closed-windows")
-    assert main(["identify", str(path), *MODEL, *closed, "--json", str(out)]) == 0
+    assert main(["identify", str(path), *MODEL, "--json", str(out)]) == 0
     document = strict(out.read_text("utf-8"))
     assert document["result"] == "no_slip"
+    # Another projection would find no slip either, and is not tried.
+    assert document["projection"] == "closed_windows"
     assert "The axis never slips" in capsys.readouterr().out
     assert main(["identify", str(path), *MODEL, *closed, "--save", str(saved)]) == 2
     assert "no model to save" in capsys.readouterr().err

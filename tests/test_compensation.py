@@ -11,7 +11,7 @@ from jaxfric.cli import main
 from jaxfric.cli.benefit import of_explanation
 from jaxfric.data import io
 from jaxfric.report import content
-from jaxfric.simulation.compensation import benefit
+from jaxfric.simulation.compensation import OPTIMISTIC, benefit
 
 TIME = jnp.asarray(np.arange(4001) / 1000)
 GOAL = 0.05 * (1 - jnp.cos(np.pi * TIME))
@@ -72,11 +72,16 @@ def test_the_command_says_what_goes_and_what_is_assumed(tmp_path, capsys, monkey
     printed = capsys.readouterr().out
     assert "tracking error" in printed and "Assumed: the machine is this model" in printed
     assert "pd:kp=50000,kd=1000" in printed  # a double pole at 100 rad/s of 5 kg
+    assert printed.rstrip().endswith(OPTIMISTIC)
     found = json.loads((tmp_path / "benefit.json").read_text())
     assert found["schema"] == "jaxfric.benefit/1" and found["error_removed"] > 0.9
     table = np.genfromtxt(out, delimiter=",", names=True)
     left = np.sqrt(np.mean((table["position"] - np.asarray(GOAL)) ** 2))
     assert left == pytest.approx(found["compensated"]["error"], rel=1e-6)
+    other = tmp_path / "other.json"
+    other.write_text(json.dumps(machine(**{"coulomb+": 12.0}).to_dict()))
+    assert main(["simulate", model, log, "--compensate", str(other), "-o", out]) == 0
+    assert OPTIMISTIC not in capsys.readouterr().out
     assert main(["simulate", model, log, "-o", out, "--json", document]) == 2
     assert "--compensate" in capsys.readouterr().err
 
@@ -92,7 +97,7 @@ def test_export_says_what_feed_forward_would_be_worth(tmp_path, capsys, monkeypa
     found = benefit(machine(), reference())
     assert f"{found.without.error:.3g} m rms without" in said, said
     assert f"{found.error_removed:.0%} removed" in said
-    assert "with pd:kp=50000,kd=1000" in said and "This is optimistic" in said
+    assert "with pd:kp=50000,kd=1000" in said and OPTIMISTIC in said
 
 
 def test_an_explanation_compares_feed_forward_by_both_models():

@@ -1419,7 +1419,7 @@ def test_what_holds_the_accelerations_noise_has_to_show_through_a_wider_kernel(h
         ("position_lines", ([], []), "period 2.5 mm"),
         ("time_lines", ([], []), "0.4 Hz"),
         ("force_rate", ([0.0, 1.0], [0.002]), "the force acts 0.002 s late"),
-        ("force_rate", ([0.0, 1.0], [-0.002]), "the force acts 0.002 s early"),
+        ("force_rate", ([0.0, 1.0], [-0.002]), "the recorded force is 0.002 s late"),
     ],
 )
 def test_a_place_is_told_with_its_unit(coordinate, curve, detail):

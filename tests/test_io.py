@@ -758,7 +758,8 @@ def test_text_in_a_number_column_is_located(tmp_path):
 
 BAD = {
     "empty": ("", "empty"),
-    "header only": ("t,x,f\n", "no samples"),
+    "header only": ("t,x,f\n", "no samples below its first line, 't, x, f'"),
+    "a word": ("hello", "no samples below its first line, 'hello'.* numbers for each sample"),
     "comments only": ("# nothing\n", "no samples"),
     "ragged": ("t,x,f\n0,1,2\n1,2\n" + "2,3,4\n" * 20, "row 3 has 2 fields"),
     "no header": ("0,1,2\n1,2,3\n" * 20, "column1, column2, column3"),

@@ -280,6 +280,11 @@ def test_watch_says_when_the_axis_moves_faster_than_at_first(tmp_path, capsys, m
     last = told[-1]["parameters"]
     assert last["coulomb+"] == pytest.approx(6, rel=1e-2)
     assert last["viscous-"] == pytest.approx(40, rel=1e-2)
+    # The room above the fastest sample is not the speed of the axis.
+    assert told[0]["fastest_seen"] == pytest.approx(0.02, rel=1e-4)
+    assert main(["watch", str(path), "--once"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "speeds up to 0.02 m/s so far; up to 0.04 m/s are told apart" in said
 
 
 def test_watch_says_what_is_wrong(tmp_path, capsys, monkeypatch):

@@ -540,15 +540,17 @@ def scales(low, high, fastest):
     ("there", "said"),
     [
         (scales(-1.0, 10.0, 50.0), ""),
+        (scales(0.0, 10.0, 56.0), ""),  # a tenth above most of this one's samples, not above all
         (scales(-3.0, 10.0, 50.0), "goes from -3 to 10 mm, this one from 0 to 10 mm:"),
-        (scales(0.0, 10.0, 60.0), "moves at up to 60 mm/s, this one at 50:"),
-        (scales(0.0, 12.0, 60.0), "10 mm, and moves at up to 60 mm/s"),
+        (scales(0.0, 10.0, 60.0), "moves at 60 mm/s, this one at up to 52:"),
+        (scales(0.0, 12.0, 60.0), "10 mm, and moves at 60 mm/s"),
     ],
 )
 def test_where_only_the_held_out_recording_moves_is_told(there, said):
-    motion = types.SimpleNamespace(unit_names={"position": "mm", "force": "N"})
+    units, velocity = {"position": "mm", "force": "N"}, np.array([0.0, -52.0, 50.0, 99.0])
+    motion = types.SimpleNamespace(unit_names=units, velocity=velocity)  # the last one is padding
     here, held = (
-        types.SimpleNamespace(limits=limits, located=True, motion=motion)
+        types.SimpleNamespace(limits=limits, located=True, motion=motion, nodes=3)
         for limits in (scales(0.0, 10.0, 50.0), there)
     )
     told = farther(types.SimpleNamespace(evidence=here, held=held))

@@ -9,7 +9,7 @@ import numpy as np
 from ..data.recording import Recording
 from ..identification import documents
 from ..models import Model
-from ..simulation.compensation import ASSUMED, Benefit, benefit, usual
+from ..simulation.compensation import ASSUMED, OPTIMISTIC, Benefit, benefit, usual
 from ..simulation.control import AbstractController
 from .commands import load_model, put, put_table
 
@@ -31,8 +31,10 @@ def simulated(model: Model, reference: Recording, controller, notes, arguments) 
         document = documents.made("jaxfric.benefit/1", *files)
         document |= {"units": units, "assumed": ASSUMED} | as_dict(found)
         put(arguments.json, documents.to_json(document))
-    summary = f"{found.run.num_samples} samples with compensation by {by}\n{told(found, units)}"
-    put_table(arguments.out, columns | found.run.channels, notes, f"{summary}\n{ASSUMED}")
+    own = drive.to_dict() == model.to_dict()
+    summary = f"{found.run.num_samples} samples with compensation by {by}"
+    said = f"{summary}\n{told(found, units, own)}"
+    put_table(arguments.out, columns | found.run.channels, notes, said)
     return 0
 
 
@@ -62,14 +64,15 @@ def as_dict(found: Benefit) -> dict[str, Any]:
     return both | {"error_removed": found.error_removed, "force_removed": found.force_removed}
 
 
-def told(found: Benefit, units: Mapping[str, str]) -> str:
-    """The figures in two lines."""
+def told(found: Benefit, units: Mapping[str, str], own: bool) -> str:
+    """The figures in two lines, and what they assume; `own`: by the machine's own model."""
     position, force = units["position"], units["force"]
     return (
         f"tracking error {found.without.error:.3g} {position} rms without, "
         f"{found.compensated.error:.3g} with compensation: {found.error_removed:.0%} removed\n"
         f"controller force {found.without.force:.3g} {force} rms without, "
-        f"{found.compensated.force:.3g} with: {found.force_removed:.0%} removed"
+        f"{found.compensated.force:.3g} with: {found.force_removed:.0%} removed\n"
+        f"{ASSUMED}{f' {OPTIMISTIC}' if own else ''}"
     )
 
 
@@ -81,7 +84,7 @@ def exported(model: Model, reference: Recording, arguments: Namespace) -> str:
         raise ValueError(f"{arguments.model}, {arguments.reference}: {error}") from error
     return (
         f"Predicted benefit as feed-forward along {arguments.reference}, with {chosen}:\n"
-        f"{told(found, dict(model.units))}\n{ASSUMED} This is optimistic: the machine will differ."
+        f"{told(found, dict(model.units), own=True)}"
     )
 
 

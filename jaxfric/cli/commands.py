@@ -34,7 +34,7 @@ from ..models import Model
 from ..signals import kernel_half_width, prepare
 from ..simulation.errors import arrived, delay_of, force_error, in_motion, relative, residual
 from ..terms.actuator import PREDICTED, REACTION
-from ..units import SI
+from ..units import SI, written_factor
 from .messages import message, say
 from .saving import saved
 
@@ -309,9 +309,10 @@ def in_units(recording: Recording, model: Model, arguments: Namespace) -> Record
     for quantity, unit in own.items():
         stated = quantity in arguments.units or unit != SI[quantity]
         if unit != wanted[quantity] and stated:
+            number = written_factor(unit, wanted[quantity])
             raise ValueError(
                 f"{recording.source}: {quantity} is in {unit}, in the model in "
-                f"{wanted[quantity]}. Convert: --scale {quantity}=FACTOR "
+                f"{wanted[quantity]}. Convert: --scale {quantity}={number} "
                 f"--units {quantity}={wanted[quantity]}."
             )
     return dataclasses.replace(recording, units=tuple(wanted.items()))

@@ -8,10 +8,10 @@ from ..data.provenance import versions
 from ..data.recording import Recording, uniform
 from ..data.summary import facts
 from ..data.targets import standard
-from ..identification import documents, tabulate
+from ..identification import documents
 from ..identification.identified import Identified
 from ..identification.identifying import identify
-from ..identification.presliding import Presliding, comparison, presliding, sentence
+from ..identification.presliding import Presliding, comparison, doubt, presliding, sentence
 from ..looks.text import Block, text
 from ..models import name_of, named
 from ..simulation.errors import force_error
@@ -80,6 +80,6 @@ def _told(file: str, found: Identified, test: Presliding, errors: dict[str, floa
     if "bristles" in errors:
         before, after = errors["jumping"], errors["bristles"]
         said.append(f"Force error of predict: {before:.2%} where friction jumps, {after:.2%} with.")
-    if found.result_name != tabulate.FINE:
-        said.append(f"The friction beside it is {found.result_name}: {found.diagnosis}")
+    if against := doubt(test, found):
+        said.append(f"The friction beside it is {against}")
     return [[f"{file}: model {name_of(found.model.term)}"], *comparison(test), said]

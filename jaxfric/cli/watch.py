@@ -85,7 +85,7 @@ def _generated(start: feed.Start, source: str, arguments: Namespace) -> int:
     write_text(arguments.c, c_source(start.slowest, start.fastest, **options))
     say(
         f"{arguments.c}: C99 for slip from {start.slowest:.3g} on and speeds up to "
-        f"{start.fastest:.3g} to begin with, as {source} has them."
+        f"{start.fastest:.3g} to begin with; {source} begins with up to {start.seen:.3g}."
     )
     return 0
 
@@ -125,13 +125,15 @@ class _Told:
             "sample_rate": start.rate,
             "slowest": start.slowest,
             "fastest": start.fastest,
+            "fastest_seen": start.seen,
             "units": self._units,
         }
         self._put(
             event,
             f"{source}: {start.rate:.6g} Hz, force in {force}, position in {position}\n"
             f"  {stream.served}\n"
-            f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.fastest:.3g} {speed}",
+            f"slip from {start.slowest:.3g} {speed} on, speeds up to {start.seen:.3g} {speed} so "
+            f"far; up to {start.fastest:.3g} {speed} are told apart",
         )
 
     def speeds(self, time: float, velocity: float) -> None:

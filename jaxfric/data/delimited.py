@@ -132,7 +132,7 @@ def _plain_csv(lines: list[str], dialect: Dialect, path: Path) -> Table:
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
-        raise ValueError(f"{path}: the file has a header but no samples.")
+        raise heading.without_samples(path, dialect.header)
     return _regular_csv(lines, dialect) or _any_csv(lines, dialect, path)
 
 
@@ -200,7 +200,7 @@ def _any_csv(lines: list[str], dialect: Dialect, path: Path) -> Table:
     if any(len(row) != width for row in rows):
         rows = [_fit(row, width, i + dialect.first + 1, path) for i, row in enumerate(rows)]
     if not rows:
-        raise ValueError(f"{path}: the file has a header but no samples.")
+        raise heading.without_samples(path, dialect.header)
     cells = zip(dialect.header, zip(*rows, strict=True), strict=True)
     columns = {name: _parse(column, dialect.decimal) for name, column in cells}
     return Table(columns, dialect.first + 1, notes)

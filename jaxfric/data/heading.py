@@ -2,11 +2,13 @@
 
 import csv
 import re
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from .iso import is_moment
+from .printable import short
 from .spellings import is_unit
 
 DELIMITERS = ",;\t|"
@@ -36,7 +38,7 @@ def dialect(lines: list[str], path: Path) -> Dialect:
     """
     rows = [i for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
     if not rows:
-        raise ValueError(f"{path}: the file holds no samples.")
+        raise without_samples(path)
     if len(lines[rows[0]]) > _LONGEST_LINE:
         raise ValueError(
             f"{path}: row {rows[0] + 1} has {len(lines[rows[0]])} characters, more than any row of "
@@ -62,6 +64,15 @@ def dialect(lines: list[str], path: Path) -> Dialect:
     comma = any(re.match(r"\s*[-+]?\d+,\d+", cell) for cell in split(lines[data], delimiter))
     decimal = "," if delimiter != "," and comma else "."
     return Dialect(unique(header), first, delimiter, decimal, notes)
+
+
+def without_samples(path: Path, header: Sequence[str] = ()) -> ValueError:
+    """That a file holds nothing below its header, which may as well be the text of no log."""
+    found = f" below its first line, {short(', '.join(header))!r}" if header else ""
+    return ValueError(
+        f"{path}: the file holds no samples{found}. A log has a line of names (time, force, "
+        "position or velocity), then a line of numbers for each sample."
+    )
 
 
 def _above(lines: list[str], rows: list[int]) -> tuple[int, str | None]:

@@ -183,7 +183,9 @@ def document(
         detail = f"{found.peak:.4g} Hz"
     elif found.coordinate == "force_rate":
         late = float(found.curve[1][0])
-        detail = f"the force acts {abs(late):.2g} s {'late' if late > 0 else 'early'}"
+        # As the findings say it: a force that acts early is one that is recorded late.
+        said = "the force acts" if late > 0 else "the recorded force is"
+        detail = f"{said} {abs(late):.2g} s late"
     elif len(found.curve[0]):
         at, height = found.curve
         peak = int(np.argmax(np.abs(height)))

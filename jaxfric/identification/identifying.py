@@ -17,7 +17,7 @@ from ..models import Model
 from ..terms.base import AbstractTerm
 from . import alignment, grouping
 from .checking import checked, looked_at
-from .identified import Identified, raise_unless_successful
+from .identified import Identified, Result, raise_unless_successful
 from .narrowing import narrowed, reaching
 from .projections import AbstractProjection, WeakForm
 from .setup import Setup, ready_rows, set_up, structure, together
@@ -121,7 +121,7 @@ def _batch(how: _How, recording: Recording, rows: Sequence[signals.Ready]) -> Id
     found = grouping.grouped(keys, solve)
     if how.projection is not None or bool(np.all(found.weak)):
         return found
-    wide = np.flatnonzero(np.asarray(found.covered) < LEAST_COVERED)
+    wide = np.flatnonzero(_too_open(found))
     if not wide.size:
         return found
 
@@ -146,7 +146,8 @@ def _together(
     looked = looked_at(recording, rows, how.given) if rows else None
     found, design = solve(*setup)
     weak = WeakForm(setup.width)
-    if how.projection is None and setup.projection != weak and _too_open(found):
+    known = not batch and not isinstance(found.covered, jax.core.Tracer)
+    if how.projection is None and setup.projection != weak and known and _too_open(found):
         found, design = solve(*setup._replace(projection=weak))
         setup = setup._replace(projection=weak)
     apart = None
@@ -189,7 +190,10 @@ def _named_in(model: Model, units) -> Model:
     return dataclasses.replace(model, units=units)
 
 
-def _too_open(found: Identified) -> bool:
-    """Whether closed windows leave out too much of a recording that is not traced or a batch."""
-    known = not isinstance(found.covered, jax.core.Tracer) and jnp.ndim(found.covered) == 0
-    return known and float(found.covered) < LEAST_COVERED
+def _too_open(found: Identified) -> np.ndarray:
+    """Whether closed windows leave out too much of a recording, or of each row of a batch.
+
+    Where the axis never slips another projection finds no slip either.
+    """
+    moves = np.asarray(found.result != Result.no_slip)
+    return (np.asarray(found.covered) < LEAST_COVERED) & moves

@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .. import signals
+from ..checks import passive
 from ..data.recording import Recording, require
 from ..looks.text import Block, Table
 from ..models import Model
@@ -22,7 +23,9 @@ from ..terms import bristles
 from ..units import DAMPING, STIFFNESS, spell
 from .bristle_fit import HALF_WIDTH, Rows, linear, refined, rows_of, scan, starts, through
 from .deciding import STRONG, independent
-from .uncertainty import Estimate, deviations, places
+from .identified import LEAST_EXPLAINED, Result
+from .tabulate import FINE
+from .uncertainty import COSINES, Estimate, deviations, places, student_quantile
 
 # Eight places a decade of stiffness, between which the cost is smooth.
 PER_DECADE = 8
@@ -229,6 +232,26 @@ def sentence(test: Presliding, units: dict[str, str]) -> str:
         f"{0.5 * float(high - low):.2g} {test.damping.unit}; over {test.distance:.2g} "
         f"{units['position']}."
     )
+
+
+def doubt(test: Presliding, found: Any) -> str:
+    """What speaks against the friction beside the bristles; empty where nothing does.
+
+    Where friction bends in truth, friction that jumps describes the recording badly, and may seem
+    to drive the axis. Then the parameters refined beside the bristles count instead.
+    """
+    if found.result_name not in ("not_described", "not_passive"):
+        return "" if found.result_name == FINE else f"{found.result_name}: {found.diagnosis}"
+    if test.model is None or test.kind == "jump":
+        return f"{found.result_name}: {found.diagnosis}"
+    left = next(each.filtered_force_error for each in test.kinds if each.name == test.kind)
+    if left**2 > 1 - LEAST_EXPLAINED:
+        return f"not_described: {Result[Result.not_described]}"
+    bound, values = student_quantile(0.975, COSINES), test.model.parameters
+    highest = {name: float(values[name]) + bound * e for name, e in test.standard_errors.items()}
+    if any(passive(name) and most < 0 for name, most in highest.items()):
+        return f"not_passive: {Result[Result.not_passive]}"
+    return ""
 
 
 def comparison(test: Presliding) -> list[Block]:

@@ -196,8 +196,9 @@ class Derivative:
 
 class Start(NamedTuple):
     """What the first samples tell: the samples themselves, with velocity; slowest and fastest
-    speed, m/s; the derivative that goes on, if there is no velocity column; the sample rate, Hz;
-    the severe remarks on the columns, beside which no figure is right.
+    speed told apart, m/s, the latter with room for a faster motion; the derivative that goes on, if
+    there is no velocity column; the sample rate, Hz; the severe remarks on the columns, beside
+    which no figure is right.
     """
 
     samples: list[Moving]
@@ -206,6 +207,11 @@ class Start(NamedTuple):
     derivative: Derivative | None
     rate: float
     remarks: tuple[checks.Remark, ...] = ()
+
+    @property
+    def seen(self) -> float:
+        """The fastest speed of the first samples, m/s."""
+        return self.fastest / ABOVE
 
 
 def begin(
