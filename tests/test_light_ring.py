@@ -14,8 +14,10 @@ def swept(top, seed):
     step, count = 1 / (rate * sub), 16 * rate * sub
     time = np.arange(count) * step
     factor = (top / 0.2) ** (time / 16)
+    begun = np.minimum(time, 1.0)
     phase = 2 * np.pi * 0.2 * 16 / np.log(top / 0.2) * (factor - 1)
-    goal = 2.5 * (0.035 / 2.5) ** (time / 16) * np.sin(phase) * np.minimum(time, 1.0) ** 2
+    fade = (0.035 / 2.5) ** (time / 16) * begun**3 * (10 - 15 * begun + 6 * begun**2)
+    goal = 2.5 * fade * np.sin(phase)
     wanted = np.gradient(goal, step)
     ahead = (MOTOR + LOAD) * np.gradient(wanted, step)
     x = v = load = speed = 0.0

@@ -84,26 +84,6 @@ def test_a_tilt_is_gravity_and_no_zero():
     assert set(beside.chosen) - gravity == {"joint/yaw/armature"}
 
 
-def test_a_load_beside_the_middle_of_a_link_is_no_zero():
-    """It turns the link's centre of mass about the elbow, as a zero of that would."""
-    mass, at = 0.8, np.array([0.29, 0.0, 0.05])
-    whole, own = 2.1 + mass, np.array([0.15, 0.02, 0.0])
-    centre = (2.1 * own + mass * at) / whole
-    inertia = np.diag([0.005, 0.025, 0.025])
-    for m, place in ((2.1, own - centre), (mass, at - centre)):
-        inertia += m * (place @ place * np.eye(3) - np.outer(place, place))
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
-    full = " ".join(f"{each:.6g}" for each in (xx, yy, zz, xy, xz, yz))
-    loaded = GIVEN.replace(
-        'pos=".15 .02 0" mass="2.1" diaginertia=".005 .025 .025"',
-        f'pos="{" ".join(map(str, centre))}" mass="{whole}" fullinertia="{full}"',
-    )
-    carrying = parts(loaded)
-    recorded = [faults._rows(part) for part in carrying]
-    assert faults._searched(carrying, recorded, Faults()).faults.zeros
-    assert not faults.find(carrying).faults.zeros
-
-
 @pytest.mark.parametrize(
     ("chosen", "left", "says"),
     [
