@@ -65,8 +65,8 @@ def regressor(
 ) -> tuple[Float[np.ndarray, "10 N"], Float[np.ndarray, "10 N"]]:
     """Rest and momentum of a joint's force by each of the ten inertial parameters of a body.
 
-    The above, by the parameters: of the first moment r · (J_v × ω + v × J_w) is the momentum, of
-    the inertia Rᵀ J_w and Rᵀ ω by pairs.
+    The force above for one parameter at a time. What r is multiplied by is one vector for its three
+    components: momentum r · (J_v × ω + v × J_w), and so on.
     """
     moving, spin = frame.velocity, frame.spin
     (by_move, by_turn), (move_rate, turn_rate) = (

@@ -15,26 +15,21 @@ import numpy as np
 
 from ...data.recording import Recording
 from ...simulators import Mujoco
-from ...terms import KNOWN_FEEDBACK, at_other_times
+from ...terms import at_other_times
 from ...terms.effects.late import CLOCK
 from ..acceptance import LINEARITY
-from ..least_squares import orthonormal
 from ..mismatch import MOST_WRONG, fewest
-from ..predictions import rate
 from .changes import Changes, by_gravity, by_zero, differences
-from .rows import Part, Rows, Stack, energy, estimate, nodes, rows_of, stacked
+from .rows import Part, Rows, Stack, energy, estimate, rows_of, stacked
+from .shifts import HALVED, shift_of
 
 ZERO, OFFSET, DRIFT = "zero/", CLOCK.name, "clock_drift"
 # A quarter of the power: what leaves more is not the fault, or not alone.
 LEAVES = 0.25
-# What a clock has to leave of what all other values leave, by itself and beside them.
-HALVED = 0.5
 # Steps below this part of the standard error change nothing.
 ROUNDS, CLOSE = 6, 0.1
 # Further, rad, an angle's sine is no straight line: 5 %.
 FAR = 0.5
-# Shifts of up to this part of the record are tried.
-FARTHEST = 8
 
 
 class Faults(NamedTuple):
@@ -114,7 +109,7 @@ def find(parts: Sequence[Part], zeros: bool = True) -> FaultSearch:
     recorded = [_rows(part) for part in parts]
     found = _found if zeros else _searched
     seen = found(parts, recorded, Faults())
-    late = _shift(recorded)
+    late = shift_of(recorded)
     if not late:
         return seen
     # The shift knows of few values: of a spring, say, it makes a clock.
@@ -337,35 +332,3 @@ def _enough(rows: Sequence[Rows]) -> float:
     """The energy that no sensor of force resolves."""
     force = sum(float(np.sum((r.weight * r.evidence.force) ** 2)) for r in rows)
     return LINEARITY**2 * force
-
-
-def _shift(rows: Sequence[Rows]) -> float:
-    """How late the force is, s, where whole nodes halve what any values leave; else zero.
-
-    A gain, inertia, friction and a constant are fitted beside each shift: where values are wrong,
-    a force of the wrong size is near a shifted one too, above all where the motion repeats.
-    """
-    step = min(each.evidence.reach for each in rows) / 6
-    first = nodes(rows[0])
-    even = np.arange(first[0], first[-1], step)
-    most = len(even) // FARTHEST
-    inner = slice(most, len(even) - most)
-    pairs = []
-    for each in rows:
-        at, motion = nodes(each), each.evidence.motion
-        known = np.asarray(motion.channels["known_force"], float)
-        speed = np.asarray(motion.velocity, float)
-        plain = known, rate(each.evidence, speed), speed, np.sign(speed), np.ones_like(speed)
-        columns = [np.interp(even, at, x) for x in plain]
-        force = each.weight * np.interp(even, at, np.asarray(motion.force, float))
-        state = np.asarray(motion.channels.get(KNOWN_FEEDBACK, np.zeros_like(speed)), float)
-        state = each.weight * np.interp(even, at, state)
-        pairs.append((force - state, state, orthonormal(np.stack(columns, axis=1)[inner])))
-
-    def left(shift: int) -> float:
-        moved = [((np.roll(f, -shift) + state)[inner], basis) for f, state, basis in pairs]
-        return sum(float(force @ force - np.sum((basis.T @ force) ** 2)) for force, basis in moved)
-
-    tried = {shift: left(shift) for shift in range(-most, most + 1)}
-    best = min(tried, key=lambda shift: tried[shift])
-    return best * step if tried[best] < HALVED * tried[0] and best > 0 else 0.0
