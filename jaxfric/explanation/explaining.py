@@ -129,7 +129,8 @@ def _explain(
         with_holdout(problem, held)  # says what is wrong with it before anything takes time
     if known.fit is not None:
         known = rephased(known, problem.evidence)
-    remarks = [*inputs.remarks, *_contradictions(problem)]
+    apart = None if inputs.checked else sanity.drifting(motion, problem)
+    remarks = [*inputs.remarks, *_contradictions(problem), *([apart] if apart else [])]
     if any(remark.severe for remark in remarks):
         wrong, better = _unjudged(known, nothing(problem), inputs, doing, seed)
     else:

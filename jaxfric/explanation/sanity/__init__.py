@@ -12,6 +12,7 @@ from .checked import (
     check_logs as check_logs,
     with_checks as with_checks,
 )
+from .drifting import drifting as drifting
 from .limits import arrived as arrived
 from .pressed import stopped as stopped
 from .rows import rows_of as rows_of

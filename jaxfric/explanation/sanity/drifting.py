@@ -1,0 +1,141 @@
+"""A force on another clock than the motion, by a baseline that is fitted to the log.
+
+A force whose clock runs faster is later and later. Whatever is fitted then makes up for that: tones
+beside each of the motion's, loads and gains that change. The force is put back by Gauss-Newton.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from ...checks import Remark
+from ...identification.uncertainty import Estimate
+from ...terms import TransportDelay
+from ...terms.effects.late import CLOCK
+from ..evidence import Evidence, gather
+from ..fewest import SURE
+from ..least_squares import orthonormal, solve
+from ..motion import Motion
+from ..predictions import with_predictions
+from ..problem import Problem
+from ..quantities import quantity
+from ..regression import Fit, fit
+from ..significance import blocks
+from .faults import LEAVES, Faults, put_right
+from .shifts import HALVED
+
+# Rounds of Gauss and Newton, and the step, in parts of a sample, that ends them.
+ROUNDS, CLOSE = 8, 0.01
+# Of what is left beside all other values a drift takes so much at first order, or is not looked at.
+SUSPECT = 0.2
+
+
+class _Late(NamedTuple):
+    """How late the force is: s in the middle of the record, and more each second; the energy that
+    is left, N²; and with drifts of all the baseline's values instead of one of the clock.
+    """
+
+    clock: np.ndarray
+    errors: np.ndarray
+    energy: float
+    drifting: float
+
+
+def drifting(motion: Motion, problem: Problem) -> Remark | None:
+    """What is said of a force that is ever later than the motion; `None` where it is not.
+
+    It has to leave a quarter of what one delay leaves, and half of what is left where all values of
+    the baseline drift as well: a load that grows looks like it where the motion is of few tones.
+    """
+    evidence, recording = problem.evidence, motion.recording
+    if recording.num_segments != 1 or not evidence.clock:
+        return None
+    rows = _Columns(evidence, problem.base)
+    if not rows.gain() > SUSPECT:
+        return None
+    plain, drift = (_late(motion, problem, count) for count in (1, 2))
+    sample, half = evidence.limits.interval, 0.5 * evidence.limits.duration
+    rate, error = drift.clock[1], drift.errors[1]
+    if not (abs(rate) > SURE * error and abs(rate) * half > sample):
+        return None
+    if not (drift.energy < LEAVES * plain.energy and drift.energy < HALVED * plain.drifting):
+        return None
+    time = np.asarray(recording.time, float)
+    late, more = (
+        quantity(Estimate(np.float64(abs(value)), np.float64(error), "s"))
+        for value, error in zip(drift.clock, drift.errors, strict=True)
+    )
+    ways = ["late" if value > 0 else "early" for value in drift.clock]
+    text = (
+        f"The force has another clock than the motion: it is {late} {ways[0]} in the middle of the "
+        f"log, and {more} {'later' if rate > 0 else 'earlier'} each second. Log both by one clock, "
+        f"or take the force at t {drift.clock[0]:+.6g} s {rate:+.6g} (t − {time.mean():.6g} s). "
+        "Until that is put right, nothing is named."
+    )
+    return Remark(CLOCK.name, text, True)
+
+
+class _Columns:
+    """A fit's rows, and what a little lateness of the force takes off, and more with time."""
+
+    def __init__(self, evidence: Evidence, current: Fit):
+        seen = with_predictions(evidence, current)
+        # A force that acts late is early in the log.
+        late = -seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
+        elapsed = evidence.elapsed[evidence.centre]
+        self.elapsed = elapsed - 0.5 * (evidence.elapsed.min() + evidence.elapsed.max())
+        self.late = np.stack([late, self.elapsed * late], axis=1)
+        self.current, self.basis = current, current.basis()
+        self.values = self.elapsed[:, None] * current.jacobian
+        self.block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
+
+    def drifting(self) -> np.ndarray:
+        """What is left where all values drift, beside one delay."""
+        beside = np.concatenate([self.basis, self.late[:, :1], self.values], axis=1)
+        basis = orthonormal(beside)
+        return self.current.residual - basis @ (basis.T @ self.current.residual)
+
+    def gain(self) -> float:
+        """The part of that which a drift of the clock takes off."""
+        left = self.drifting()
+        beside = np.concatenate([self.basis, self.late[:, :1], self.values], axis=1)
+        alone = orthonormal(self.late[:, 1:], orthonormal(beside))
+        return float(np.sum((alone.T @ left) ** 2) / max(float(left @ left), 1e-300))
+
+    def step(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """By how much later the force is, the first `count` of its numbers, and their errors."""
+        own = self.late[:, :count] - self.basis @ (self.basis.T @ self.late[:, :count])
+        value = solve(own, self.current.residual)
+        noise = self.current.residual - own @ value
+        inverse = np.linalg.pinv(own)
+        sums = np.stack([np.bincount(self.block, row * noise) for row in inverse])
+        return value, np.sqrt(np.sum(sums**2, axis=1))
+
+
+def _late(motion: Motion, problem: Problem, count: int) -> _Late:
+    """How late the force is by a delay alone (1), or by another clock (2)."""
+    clock, errors, base = np.zeros(2), np.full(2, np.inf), problem.base
+    for _ in range(ROUNDS):
+        there = gather(_put_back(motion, clock), problem.evidence.width)
+        base = fit(base.terms, there, base.betas)
+        rows = _Columns(there, base)
+        step, errors[:count] = rows.step(count)
+        ends = np.abs(step) * [1.0, 0.5 * there.limits.duration][:count]
+        if np.all(ends < CLOSE * there.limits.interval):
+            break
+        clock[:count] += step
+    left = rows.drifting()
+    return _Late(clock, errors, base.energy, float(left @ left))
+
+
+def _put_back(motion: Motion, clock: np.ndarray) -> Motion:
+    """The motion with its force put back."""
+    log = put_right(motion.recording, Faults(late=float(clock[0]), drift=float(clock[1])))
+    there = motion.forced(log.force)
+    mask = np.zeros(there.padded.num_samples, bool)
+    mask[: log.num_samples] = np.asarray(log.mask)
+    return there._replace(
+        recording=dataclasses.replace(there.recording, mask=log.mask),
+        padded=dataclasses.replace(there.padded, mask=mask),
+    )
