@@ -23,7 +23,7 @@ from ..quantities import quantity
 from ..regression import Fit, fit
 from ..significance import blocks
 from .faults import LEAVES, Faults, put_right
-from .shifts import HALVED
+from .shifts import FARTHEST, HALVED
 
 # Rounds of Gauss and Newton, and the step, in parts of a sample, that ends them.
 ROUNDS, CLOSE = 8, 0.01
@@ -84,23 +84,18 @@ class _Columns:
         # A force that acts late is early in the log.
         late = -seen.columns(TransportDelay(), np.zeros((1, 0)))[0, :, 0]
         elapsed = evidence.elapsed[evidence.centre]
-        self.elapsed = elapsed - 0.5 * (evidence.elapsed.min() + evidence.elapsed.max())
-        self.late = np.stack([late, self.elapsed * late], axis=1)
+        away = elapsed - 0.5 * (evidence.elapsed.min() + evidence.elapsed.max())
+        self.late = np.stack([late, away * late], axis=1)
         self.current, self.basis = current, current.basis()
-        self.values = self.elapsed[:, None] * current.jacobian
-        self.block = blocks(evidence.elapsed[evidence.centre], evidence.reach)
-
-    def drifting(self) -> np.ndarray:
-        """What is left where all values drift, beside one delay."""
-        beside = np.concatenate([self.basis, self.late[:, :1], self.values], axis=1)
-        basis = orthonormal(beside)
-        return self.current.residual - basis @ (basis.T @ self.current.residual)
+        self.block = blocks(elapsed, evidence.reach)
+        values = away[:, None] * current.jacobian
+        every = orthonormal(np.concatenate([self.basis, self.late[:, :1], values], axis=1))
+        # Where all values drift, beside one delay: the basis, and what is left.
+        self.drifts, self.drifting = every, current.residual - every @ (every.T @ current.residual)
 
     def gain(self) -> float:
-        """The part of that which a drift of the clock takes off."""
-        left = self.drifting()
-        beside = np.concatenate([self.basis, self.late[:, :1], self.values], axis=1)
-        alone = orthonormal(self.late[:, 1:], orthonormal(beside))
+        """The part of what is left where all values drift that a drift of the clock takes off."""
+        alone, left = orthonormal(self.late[:, 1:], self.drifts), self.drifting
         return float(np.sum((alone.T @ left) ** 2) / max(float(left @ left), 1e-300))
 
     def step(self, count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -121,12 +116,13 @@ def _late(motion: Motion, problem: Problem, count: int) -> _Late:
         base = fit(base.terms, there, base.betas)
         rows = _Columns(there, base)
         step, errors[:count] = rows.step(count)
-        ends = np.abs(step) * [1.0, 0.5 * there.limits.duration][:count]
-        if np.all(ends < CLOSE * there.limits.interval):
+        away = np.array([1.0, 0.5 * there.limits.duration])
+        if np.all(np.abs(step) * away[:count] < CLOSE * there.limits.interval):
             break
         clock[:count] += step
-    left = rows.drifting()
-    return _Late(clock, errors, base.energy, float(left @ left))
+        if not np.abs(clock) @ away < there.limits.duration / FARTHEST:
+            return _Late(clock, errors, np.inf, np.inf)
+    return _Late(clock, errors, base.energy, float(rows.drifting @ rows.drifting))
 
 
 def _put_back(motion: Motion, clock: np.ndarray) -> Motion:
