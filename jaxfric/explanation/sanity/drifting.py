@@ -15,25 +15,29 @@ from ...terms import TransportDelay
 from ...terms.effects.late import CLOCK
 from ..evidence import Evidence, gather
 from ..fewest import SURE
-from ..least_squares import orthonormal, solve
+from ..least_squares import orthonormal
 from ..motion import Motion
 from ..predictions import with_predictions
 from ..problem import Problem
 from ..quantities import quantity
 from ..regression import Fit, fit
 from ..significance import blocks
-from .faults import LEAVES, Faults, put_right
+from .faults import DRIFT, LEAVES, OFFSET, Faults, put_right
+from .rows import Stack, estimate
 from .shifts import FARTHEST, HALVED
 
 # Rounds of Gauss and Newton, and the step, in parts of a sample, that ends them.
 ROUNDS, CLOSE = 8, 0.01
-# Of what is left beside all other values a drift takes so much at first order, or is not looked at.
+# Of what drifts of all values leave it takes so much at first order, or is not looked at further:
+# it has to take half of that in the end, of which the first step is most where a delay is a small
+# part of the motion's fastest period.
 SUSPECT = 0.2
 
 
 class _Late(NamedTuple):
-    """How late the force is: s in the middle of the record, and more each second; the energy that
-    is left, N²; and with drifts of all the baseline's values instead of one of the clock.
+    """How late the force is: `clock` `(2,)`, s in the middle of the record and s more each second,
+    with its standard `errors`; the `energy` that is left, N²; and that where all values of the
+    baseline drift as well, `drifting`.
     """
 
     clock: np.ndarray
@@ -43,7 +47,8 @@ class _Late(NamedTuple):
 
 
 def drifting(motion: Motion, problem: Problem) -> Remark | None:
-    """What is said of a force that is ever later than the motion; `None` where it is not.
+    """What is said of a force that is ever later than the motion; `None` where it is not, or where
+    the log is in pieces: each begins a clock anew.
 
     It has to leave a quarter of what one delay leaves, and half of what is left where all values of
     the baseline drift as well: a load that grows looks like it where the motion is of few tones.
@@ -77,7 +82,10 @@ def drifting(motion: Motion, problem: Problem) -> Remark | None:
 
 
 class _Columns:
-    """A fit's rows, and what a little lateness of the force takes off, and more with time."""
+    """A fit's rows; and `late`, `(J, 2)`, what they change by if the force is late, N/s, and ever
+    later, N; `drifts`, a basis of all that drifts of the fit's values make, `(J, r)`, and what that
+    leaves, `drifting`, N, `(J,)`.
+    """
 
     def __init__(self, evidence: Evidence, current: Fit):
         seen = with_predictions(evidence, current)
@@ -90,7 +98,6 @@ class _Columns:
         self.block = blocks(elapsed, evidence.reach)
         values = away[:, None] * current.jacobian
         every = orthonormal(np.concatenate([self.basis, self.late[:, :1], values], axis=1))
-        # Where all values drift, beside one delay: the basis, and what is left.
         self.drifts, self.drifting = every, current.residual - every @ (every.T @ current.residual)
 
     def gain(self) -> float:
@@ -101,11 +108,10 @@ class _Columns:
     def step(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """By how much later the force is, the first `count` of its numbers, and their errors."""
         own = self.late[:, :count] - self.basis @ (self.basis.T @ self.late[:, :count])
-        value = solve(own, self.current.residual)
-        noise = self.current.residual - own @ value
-        inverse = np.linalg.pinv(own)
-        sums = np.stack([np.bincount(self.block, row * noise) for row in inverse])
-        return value, np.sqrt(np.sum(sums**2, axis=1))
+        names = [OFFSET, DRIFT][:count]
+        known = estimate(Stack(self.current.residual, own, names, self.block), names)
+        value, error = np.array([known[name] for name in names]).T
+        return value, error
 
 
 def _late(motion: Motion, problem: Problem, count: int) -> _Late:
