@@ -5,6 +5,7 @@ the held-out recording is reported as not confirmed, and the model does without 
 """
 
 from ..data.recording import Recording
+from ..terms.base import AbstractTerm
 from . import parameters as spelled, verification
 from .acceptance import HALF, LINEARITY
 from .baseline import as_given
@@ -15,7 +16,7 @@ from .motion import Motion
 from .problem import with_holdout
 from .selection import Selection
 from .slow_changes import slow, stroke_of
-from .uncertainty import by_rows
+from .uncertainty import Estimates, by_rows
 
 
 def check_signals(selection: Selection, recording: Recording, holdout: Recording) -> None:
@@ -48,10 +49,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     findings = _rephased(_with_rows(better.findings, holdout))
     nil = _nil(findings)
     borne = [_borne_out(findings, number) for number in range(len(nil))]
-    borne = [
-        each and not (none and not _borne_out(findings, number, HALF))
-        for number, (each, none) in enumerate(zip(borne, nil, strict=True))
-    ]
+    borne = [each and not none for each, none in zip(borne, nil, strict=True)]
     findings = findings.with_selected([
         selected._replace(confirmed=each)
         for selected, each in zip(findings.selection.selected, borne, strict=True)
@@ -156,9 +154,7 @@ def _borne_out(findings: Findings, number: int, part: float = 1.0) -> bool | Non
     """Whether the model with a finding is nearer to the held-out recording than without it, and
     leaves no more than a part of the energy.
 
-    `None` for what no other recording can say. Values that make up for each other, as the frequency
-    of a light ring for how late the force is, may each be none by its interval; but what halves
-    what is left of another recording, with nothing refitted, is not.
+    `None` for what no other recording can say.
     """
     if findings.selection.selected[number].effect.momentary or not _acts_there(findings, number):
         return None
@@ -181,11 +177,19 @@ def _acts_there(findings: Findings, number: int) -> bool:
 def _nil(findings: Findings) -> list[bool]:
     """Whether each finding's force may as well be none by what either recording says of it, or a
     kernel of twice the width.
+
+    Values that make up for each other, as the frequency of a light ring for how late the force is,
+    may each be none by its own interval; what halves what is left of another recording, with
+    nothing refitted, is not. But what other rows contradict is none whatever it does there.
     """
     selection = findings.selection
     start = selection.term_index(0)
     values = by_rows(findings, shaped=True)[start:] if selection.selected else []
-    return [
-        any(spelled.may_be_none(term, own.here, other) for other in (own.wide, own.there))
-        for term, own in zip(selection.last.terms[start:], values, strict=True)
-    ]
+
+    def none(number: int, term: AbstractTerm, own: Estimates) -> bool:
+        if spelled.may_be_none(term, own.here):
+            return not _borne_out(findings, number, HALF)
+        return any(spelled.may_be_none(term, own.here, other) for other in (own.wide, own.there))
+
+    pairs = zip(selection.last.terms[start:], values, strict=True)
+    return [none(number, *each) for number, each in enumerate(pairs)]
