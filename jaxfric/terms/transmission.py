@@ -167,7 +167,10 @@ def _struck(flank: _Flank, half_gap, state, motor, gain, span, swing):
     side = jnp.where(touches, side, slips)
     along = facing * load, facing * now, facing * gain, facing * side, flank.dry(side)
     over = facing * ahead - half_gap
-    over, speed, impulse = flank.touching(over, *along, time, flank.swing(time))
+    # Where no time passes nothing swings; that this is a branch spares XLA from computing the
+    # swing anew in each of the sums that it is in.
+    swung = jax.lax.cond(span > 0, flank.swing, lambda time: (1 + 0 * time, 0 * time), time)
+    over, speed, impulse = flank.touching(over, *along, time, swung)
     met = touches | strikes
     ahead = jnp.where(met, facing * (over + half_gap), ahead)
     load = jnp.where(met, facing * speed, load)
