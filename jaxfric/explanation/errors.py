@@ -11,6 +11,7 @@ from ..terms.base import changed_columns
 from . import parameters as spelled, verification
 from .acceptance import LINEARITY
 from .baseline import at_values
+from .bins import unit
 from .evidence import gather
 from .figures import Figures, cast
 from .findings import Findings, Solution
@@ -71,11 +72,26 @@ def document(
             "force_taken_later": problem.delay,
             "force_taken_later_after": better.findings.undelayed.problem.delay,
             "across_reversals": problem.reversals,
+            "slowest": _slowest(better.findings),
         },
         "filtered_holdout_force_error": filtered["holdout_force_error"],
         "filtered_holdout_refitted_error": refitted["filtered"],
         "filtered_noise_floor": filtered["noise_floor"],
     }
+
+
+def _slowest(findings: Findings) -> dict[str, Any] | None:
+    """The speed of the slowest row, below which nothing is said of friction; `None` where that is
+    no more than twice the slowest slip, where rows reach across reversals, and where the curve is
+    that of the samples.
+    """
+    evidence, selection = findings.problem.evidence, findings.selection
+    if findings.problem.reversals or selection.curve:
+        return None
+    slowest = float(np.min(np.abs(np.asarray(evidence.motion.velocity)[evidence.centre])))
+    if slowest <= 2 * evidence.limits.slowest:
+        return None
+    return {"value": slowest, "unit": unit("velocity", evidence.motion.unit_names)}
 
 
 def _held_floor(findings: Findings, figures: Figures, lag: float) -> float | None:

@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import PurePath
 from typing import Any
 
+from ..looks.unseen import slower
 from ..models import Model
 from ..terms.actuator import PREDICTED, REACTION
 from . import advice, charts, content, equations, handover
@@ -137,6 +138,7 @@ def _context(document: Mapping[str, Any], curves: Mapping[str, Any]) -> dict[str
         "assumed": (document.get("benefit") or {}).get("assumed", ""),
         "controller": (document.get("benefit") or {}).get("controller", ""),
         "hidden": content.hidden(document),
+        "slower": slower(document),
         "definitions": content.definitions(document.get("fit") or {}),
         **drawn,
         "drawn": any(drawn.values()),
