@@ -18,6 +18,7 @@ from jaxfric.explanation import (
     explain,
     explaining,
     finding,
+    holdout,
     improvement,
     least_squares,
     regression,
@@ -567,6 +568,42 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
 
         monkeypatch.setattr(improvement, "anytime", anytime)
         assert improvement.without_unsure(Dated("abc", "")).names == left
+
+
+@pytest.mark.parametrize(("gains", "left"), [((0.5, 0.4), "bc"), ((0.5, 0.05), "b"), ((0, 0), "")])
+def test_a_change_that_leans_on_what_was_refuted_goes_with_it(monkeypatch, gains, left):
+    """A payload of 6 ± 4.7 mN·m at t = 8 ± 30 s stayed, of four findings three of which the
+    held-out recording had refuted: what it took without them was a fourth of what chance makes.
+    """
+
+    class Found:
+        def __init__(self, names):
+            self.names, taken = names, dict(zip("bc", gains, strict=True))
+            energy = float(np.prod([1 - taken.get(name, 0.0) for name in names]))
+            selected = [
+                types.SimpleNamespace(
+                    effect=types.SimpleNamespace(momentary=name != "a"),
+                    trial=types.SimpleNamespace(threshold=0.1),
+                )
+                for name in names
+            ]
+            self.selection = types.SimpleNamespace(
+                selected=selected, last=types.SimpleNamespace(energy=energy)
+            )
+            self.undelayed = types.SimpleNamespace(selection=self.selection)
+
+        def without(self, number):
+            return Found(self.names[:number] + self.names[number + 1 :])
+
+    monkeypatch.setattr(holdout, "unsure", lambda findings: [])
+    errors = improvement.Errors(0.1, None, 0.1, None)
+    every = Found("abc")
+    better = improvement.Improved(None, every, False, errors, errors, claimed=every)
+    assert holdout._without_leaning(better).findings.names == "abc"  # none was refuted
+    better = holdout._without_leaning(holdout._refuting(better, every, [0]))
+    assert better.findings.names == left
+    assert better.leaning == tuple("abc".index(name) for name in "bc" if name not in left)
+    assert better.refuted == (0, *better.leaning)
 
 
 def test_what_happens_once_is_tested_by_the_interval_that_is_told():

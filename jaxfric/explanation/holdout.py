@@ -11,7 +11,7 @@ from .acceptance import HALF, LINEARITY
 from .baseline import as_given
 from .figures import Figures
 from .findings import Findings, Solution
-from .improvement import Improved, errors_of_base, force_errors
+from .improvement import Improved, errors_of_base, force_errors, unsure
 from .motion import Motion
 from .problem import with_holdout
 from .selection import Selection
@@ -56,7 +56,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     ])  # fmt: skip
     better = better._replace(claimed=findings)
     better = _refuting(better, findings, [n for n, each in enumerate(borne) if each is False])
-    better = measured(better, figures)
+    better = measured(_without_leaning(better), figures)
     tested = tuple(n for n, each in enumerate(borne) if each is not None)
     if better.after.worse(better.before, figures.rounding) and tested != better.refuted:
         borne_out = better.findings.selection.selected
@@ -65,7 +65,7 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
         better = _refuting(better, better.findings, others)._replace(refuted=tested, worse=worse)
         better = measured(better, figures)
     if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
-        better = measured(_without_nil(_at_base_values(better)), figures)
+        better = measured(_without_leaning(_without_nil(_at_base_values(better))), figures)
     if better.after.worse(better.before, figures.rounding):
         base, every = findings.at_base(better.first), tuple(range(len(borne)))
         better = better._replace(findings=base, refitted=False, refuted=every)
@@ -110,11 +110,38 @@ def _at_base_values(better: Improved) -> Improved:
 
 def _without_nil(better: Improved) -> Improved:
     """Without findings whose force may as well be none once the base has its own values."""
-    findings = better.findings
+    return _also(better, [n for n, none in enumerate(_nil(better.findings)) if none])
+
+
+def _without_leaning(better: Improved) -> Improved:
+    """Without changes at a moment that may be none, or that chance makes, once what was refuted is
+    gone: beside that they were sure.
+    """
+    refuted = better.refuted
+    while refuted and (gone := unsure(better.findings) or _by_chance(better.findings)):
+        better = _also(better, gone[-1:])
+    more = [n for n in better.refuted if n not in refuted]
+    return better._replace(leaning=(*better.leaning, *more))
+
+
+def _by_chance(findings: Findings) -> list[int]:
+    """Numbers of the changes at a moment that take no more of what is left without them than the
+    draws did of what they were found in.
+    """
+    left, numbers = findings.undelayed.selection.last.energy, list[int]()
+    for number, selected in enumerate(findings.selection.selected):
+        if selected.effect.momentary:
+            without = findings.without(number).undelayed.selection.last.energy
+            if not 1 - left / without > selected.trial.threshold:
+                numbers.append(number)
+    return numbers
+
+
+def _also(better: Improved, gone: list[int]) -> Improved:
+    """Without further findings, of these numbers among those that remain."""
     numbers = [n for n in range(len(better.claimed.selection.selected)) if n not in better.refuted]
-    gone = [n for n, none in enumerate(_nil(findings)) if none]
     refuted = (*better.refuted, *(numbers[n] for n in gone))
-    return _refuting(better, findings, gone)._replace(refuted=tuple(sorted(refuted)))
+    return _refuting(better, better.findings, gone)._replace(refuted=tuple(sorted(refuted)))
 
 
 def measured(better: Improved, figures: Figures) -> Improved:

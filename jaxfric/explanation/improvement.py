@@ -62,7 +62,8 @@ class Improved(NamedTuple):
       findings with those; `spoilt`: the errors of that model; `seen`: those that noise is not.
     - `claimed`: the findings that the recording shows, of which the held-out recording does not
       confirm those of the numbers `refuted`; `worse`: the errors before and with them, where what
-      each of them removes there is confirmed, but the model with them is worse.
+      each of them removes there is confirmed, but the model with them is worse; `leaning`: those
+      of the refuted that may be none without the others.
     """
 
     first: Fit
@@ -77,6 +78,7 @@ class Improved(NamedTuple):
     claimed: Findings | None = None
     refuted: tuple[int, ...] = ()
     worse: tuple[Errors, Errors] | None = None
+    leaning: tuple[int, ...] = ()
 
 
 def improved(first: Fit, findings: Findings, figures: Figures) -> Improved:
@@ -151,28 +153,31 @@ def _dropped(before: Findings, after: Findings) -> tuple[str, ...]:
 
 
 def without_unsure(findings: Findings) -> Findings:
-    """Without changes at a moment whose size may as well be none once the moment is uncertain, or
-    that may have been at any moment, and without pushes all of which may be none.
+    """Without what is [`unsure`][]."""
+    while numbers := unsure(findings):
+        findings = findings.without(numbers[-1])
+    return findings
+
+
+def unsure(findings: Findings) -> list[int]:
+    """Numbers of the changes at a moment whose size may as well be none once the moment is
+    uncertain, or that may have been at any moment, and of pushes all of which may be none.
 
     What a change is told by is the value before and after: an interval that holds both says
     nothing. No other recording can bear out what happens once, so that it is tested by the
     intervals that are told, which are wider where one acts in few blocks.
     """
-    while True:
-        selected = findings.selection.selected
-        dated = [n for n, s in enumerate(selected) if s.effect.moment or s.effect.isolated]
-        if not dated:
-            return findings
-        values = estimated(findings)[findings.selection.term_index(0) :]
-        terms = findings.selection.last.terms[findings.selection.term_index(0) :]
-        unsure = [
-            n
-            for n in dated
-            if spelled.may_be_none(terms[n], values[n], as_told=True) or anytime(findings, n)
-        ]
-        if not unsure:
-            return findings
-        findings = findings.without(unsure[-1])
+    selected = findings.selection.selected
+    dated = [n for n, s in enumerate(selected) if s.effect.moment or s.effect.isolated]
+    if not dated:
+        return []
+    values = estimated(findings)[findings.selection.term_index(0) :]
+    terms = findings.selection.last.terms[findings.selection.term_index(0) :]
+    return [
+        n
+        for n in dated
+        if spelled.may_be_none(terms[n], values[n], as_told=True) or anytime(findings, n)
+    ]
 
 
 def _without_idle(findings: Findings) -> Findings | None:

@@ -122,10 +122,15 @@ def not_confirmed(better: Improved) -> list[Finding]:
         every[n]._replace(
             confirmed=False,
             recurs=_recurs(every[n], better),
-            sentence=f"{every[n].sentence}{_reason(every[n], better)}",
+            sentence=every[n].sentence
+            + (_LEANING if n in better.leaning else _reason(every[n], better)),
         )
         for n in better.refuted
     ]
+
+
+# Of a change at a moment, which no other recording can bear out.
+_LEANING = " Without what the held-out recording refutes it may as well be none: it is left out."
 
 
 def with_size(refuted: Sequence[Finding]) -> list[Finding]:
