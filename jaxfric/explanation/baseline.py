@@ -21,7 +21,8 @@ class Baseline(NamedTuple):
     Of another recording also what it obeys, term by term, `fit`, and the `covariance` of its
     parameters, affine ones first, `(P, P)`, infinite where not visible; `structured`, the
     coordinates over which it leaves structure, and whether its residual is `rough`: neither is a
-    difference. `start`: β from which the sum is fitted, `(d,)`, where they are known.
+    difference; and its `rows`. `start`: β from which the sum is fitted, `(d,)`, where they are
+    known.
     """
 
     structure: AbstractTerm
@@ -32,6 +33,7 @@ class Baseline(NamedTuple):
     structured: frozenset[str] = frozenset()
     rough: bool = False
     start: np.ndarray | None = None
+    rows: Evidence | None = None
 
     @property
     def errors(self) -> np.ndarray | None:

@@ -13,7 +13,7 @@ from . import parameters as spelled, verification
 from .acceptance import LINEARITY
 from .baseline import Baseline, beginning
 from .evidence import Evidence
-from .findings import Solution
+from .findings import Findings, Solution
 from .intervals import spread
 from .locate import locate
 from .mismatch import SURE, Mismatch
@@ -21,7 +21,11 @@ from .predictions import PREDICTED, with_predictions
 from .problem import LEAST_SHARE
 from .regression import Fit, fit
 from .structure import significant
+from .uncertainty import estimated
 from .verdict import rough
+
+# Steps from where a model was fitted: with one law more it is near.
+REFITTED = 8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,6 +70,7 @@ def obeyed(recording: Recording, solution: Solution, seed: int = 0) -> Baseline:
         frozenset(each.coordinate for each in found),
         rough(errors, {}),
         beginning(model.term),
+        problem.evidence,
     )
 
 
@@ -80,6 +85,48 @@ def rephased(known: Baseline, evidence: Evidence) -> Baseline:
         return known
     there = verification.at_phase(current, evidence, waves)
     return known._replace(model=spelled.model(there, known.model.units), fit=there)
+
+
+def new(known: Baseline, findings: Findings) -> Findings:
+    """The findings without what is no change since the other recording.
+
+    What the model of that lacks of the machine shows in both, over other speeds and places: with
+    the law as found here the model is nearer to that recording, too. And of what has grown from
+    none the interval that is told leaves out zero.
+    """
+    if known.rows is None:
+        return findings
+    seen = with_predictions(known.rows, known.fit)
+    number = 0
+    while number < len(findings.selection.selected):
+        if _as_before(seen, known.fit, findings, number):
+            findings, number = findings.without(number), 0
+        else:
+            number += 1
+    return findings
+
+
+def _as_before(seen: Evidence, known: Fit, findings: Findings, number: int) -> bool:
+    """Whether a finding may be none, or is in the other recording's rows too, the rest refitted
+    there. Of what belongs to a moment the other recording says nothing.
+    """
+    problem, selection = findings.examined_in(number)
+    if selection.selected[number].effect.momentary:
+        return False
+    index, last = selection.term_index(number), selection.last
+    term = last.terms[index]
+    told = estimated(findings)[findings.selection.term_index(number)]
+    if spelled.may_be_none(term, told, as_told=True):
+        return True
+    channels = term.coordinates & set(problem.evidence.motion.channels)
+    if not channels <= set(seen.motion.channels):
+        return False
+    force = seen.columns(term, last.betas[index][None])[0] @ last.alphas[index]
+    without, beside = (
+        fit(known.terms, rows, known.betas, REFITTED).energy
+        for rows in (seen, seen._replace(target=seen.target - force))
+    )
+    return beside < without
 
 
 def changed(wrong: Mismatch | None, known: Baseline, current: Fit, errors) -> Mismatch | None:
