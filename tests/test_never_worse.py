@@ -570,7 +570,9 @@ def test_a_change_or_push_whose_interval_holds_none_is_no_finding(monkeypatch, m
         assert improvement.without_unsure(Dated("abc", "")).names == left
 
 
-@pytest.mark.parametrize(("gains", "left"), [((0.5, 0.4), "bc"), ((0.5, 0.05), "b"), ((0, 0), "")])
+@pytest.mark.parametrize(
+    ("gains", "left"), [((0.5, 0.4), "bcd"), ((0.5, 0.05), "bd"), ((0, 0), "d")]
+)
 def test_a_change_that_leans_on_what_was_refuted_goes_with_it(monkeypatch, gains, left):
     """A payload of 6 ± 4.7 mN·m at t = 8 ± 30 s stayed, of four findings three of which the
     held-out recording had refuted: what it took without them was a fourth of what chance makes.
@@ -583,7 +585,7 @@ def test_a_change_that_leans_on_what_was_refuted_goes_with_it(monkeypatch, gains
             selected = [
                 types.SimpleNamespace(
                     effect=types.SimpleNamespace(momentary=name != "a"),
-                    trial=types.SimpleNamespace(threshold=0.1),
+                    trial=types.SimpleNamespace(threshold=np.inf if name == "d" else 0.1),
                 )
                 for name in names
             ]
@@ -597,9 +599,9 @@ def test_a_change_that_leans_on_what_was_refuted_goes_with_it(monkeypatch, gains
 
     monkeypatch.setattr(holdout, "unsure", lambda findings: [])
     errors = improvement.Errors(0.1, None, 0.1, None)
-    every = Found("abc")
+    every = Found("abcd")
     better = improvement.Improved(None, every, False, errors, errors, claimed=every)
-    assert holdout._without_leaning(better).findings.names == "abc"  # none was refuted
+    assert holdout._without_leaning(better).findings.names == "abcd"  # none was refuted
     better = holdout._without_leaning(holdout._refuting(better, every, [0]))
     assert better.findings.names == left
     assert better.leaning == tuple("abc".index(name) for name in "bc" if name not in left)

@@ -3,6 +3,7 @@
 import copy
 import json
 import re
+import types
 from html import unescape
 from html.parser import HTMLParser
 
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 import jaxfric as jf
+from jaxfric.explanation import errors
+from jaxfric.identification import tabulate
 from jaxfric.report import advice, charts, equations, page
 
 pytest.importorskip("jinja2", reason="pages need jinja2")
@@ -388,3 +391,42 @@ def test_two_recordings_are_compared_in_words_of_change():
     moved = FINDINGS[1] | {"sentence": "Coulomb friction rose from 2 to 3 N (± 0.1) since a; 9% x."}
     document = document | {"findings": [moved], "verdict": "explained"}
     assert advice.headline(document).startswith("Coulomb friction rose from 2 to 3 N (± 0.1) since")
+
+
+SLOWEST = {"slowest": {"value": 3.9205, "unit": "mm/s"}}
+SLOWER = "slower than 3.92 mm/s: of friction below that"
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_below_which_speed_nothing_is_said_stands_on_the_page_and_in_the_text(known):
+    """Of a bump slower than every row "stribeck would have been seen from 0.034 N" was said."""
+    fit = DOCUMENT["fit"] | {"filtered_force_error": SLOWEST if known else {"slowest": None}}
+    document = DOCUMENT | {"fit": fit}
+    assert (SLOWER in page.render(document, {})) == known
+    (*_, last) = tabulate._places(document)
+    assert (SLOWER in last[0] if isinstance(last, list) else False) == known
+
+
+@pytest.mark.parametrize(
+    ("speeds", "reversals", "curve", "slowest"),
+    [
+        ([-3.0, 0.5, 2.0], False, {}, 0.5),
+        ([-3.0, 0.15, 2.0], False, {}, None),
+        ([-3.0, 0.5, 2.0], True, {}, None),
+        ([-3.0, 0.5, 2.0], False, {"stribeck_force+": None}, None),
+    ],
+)
+def test_nothing_is_said_below_the_speed_of_the_slowest_row(speeds, reversals, curve, slowest):
+    evidence = types.SimpleNamespace(
+        motion=types.SimpleNamespace(
+            velocity=np.array([0.01, *speeds]), unit_names={"position": "mm", "force": "N"}
+        ),
+        centre=np.arange(1, 4),
+        limits=types.SimpleNamespace(slowest=0.1),
+    )
+    found = types.SimpleNamespace(
+        problem=types.SimpleNamespace(evidence=evidence, reversals=reversals),
+        selection=types.SimpleNamespace(curve=curve),
+    )
+    expected = None if slowest is None else {"value": slowest, "unit": "mm/s"}
+    assert errors._slowest(found) == expected

@@ -87,28 +87,29 @@ def rephased(known: Baseline, evidence: Evidence) -> Baseline:
     return known._replace(model=spelled.model(there, known.model.units), fit=there)
 
 
-def new(known: Baseline, findings: Findings) -> Findings:
+def without_unchanged(known: Baseline, findings: Findings) -> Findings:
     """The findings without what is no change since the other recording.
 
     What the model of that lacks of the machine shows in both, over other speeds and places: with
     the law as found here the model is nearer to that recording, too. And of what has grown from
     none the interval that is told leaves out zero.
     """
-    if known.rows is None:
+    if known.rows is None or not findings.selection.selected:
         return findings
     seen = with_predictions(known.rows, known.fit)
+    there = fit(known.fit.terms, seen, known.fit.betas, REFITTED)
     number = 0
     while number < len(findings.selection.selected):
-        if _as_before(seen, known.fit, findings, number):
+        if _as_before(seen, there, findings, number):
             findings, number = findings.without(number), 0
         else:
             number += 1
     return findings
 
 
-def _as_before(seen: Evidence, known: Fit, findings: Findings, number: int) -> bool:
-    """Whether a finding may be none, or is in the other recording's rows too, the rest refitted
-    there. Of what belongs to a moment the other recording says nothing.
+def _as_before(seen: Evidence, there: Fit, findings: Findings, number: int) -> bool:
+    """Whether a finding may be none, or is in the other recording's rows too, beside its model
+    `there`, refitted. Of what belongs to a moment the other recording says nothing.
     """
     problem, selection = findings.examined_in(number)
     if selection.selected[number].effect.momentary:
@@ -122,11 +123,8 @@ def _as_before(seen: Evidence, known: Fit, findings: Findings, number: int) -> b
     if not channels <= set(seen.motion.channels):
         return False
     force = seen.columns(term, last.betas[index][None])[0] @ last.alphas[index]
-    without, beside = (
-        fit(known.terms, rows, known.betas, REFITTED).energy
-        for rows in (seen, seen._replace(target=seen.target - force))
-    )
-    return beside < without
+    rows = seen._replace(target=seen.target - force)
+    return fit(there.terms, rows, there.betas, REFITTED).energy < there.energy
 
 
 def changed(wrong: Mismatch | None, known: Baseline, current: Fit, errors) -> Mismatch | None:

@@ -81,9 +81,9 @@ def document(
 
 
 def _slowest(findings: Findings) -> dict[str, Any] | None:
-    """The speed of the slowest row, below which nothing is said of friction; `None` where that is
-    no more than twice the slowest slip, where rows reach across reversals, and where the curve is
-    that of the samples.
+    """The speed of the slowest row, with its unit, below which nothing is said of friction; `None`
+    where rows reach across reversals, where the curve is that of the samples, and where that is
+    within an octave of the slowest slip, so that hardly any slip is left out.
     """
     evidence, selection = findings.problem.evidence, findings.selection
     if findings.problem.reversals or selection.curve:

@@ -4,6 +4,8 @@ Nothing is searched again and nothing exchanged: a finding that does not bring t
 the held-out recording is reported as not confirmed, and the model does without it.
 """
 
+import numpy as np
+
 from ..data.recording import Recording
 from ..terms.base import AbstractTerm
 from . import parameters as spelled, verification
@@ -57,12 +59,13 @@ def confirmed(better: Improved, holdout: Motion, figures: Figures) -> Improved:
     better = better._replace(claimed=findings)
     better = _refuting(better, findings, [n for n, each in enumerate(borne) if each is False])
     better = measured(_without_leaning(better), figures)
-    tested = tuple(n for n, each in enumerate(borne) if each is not None)
-    if better.after.worse(better.before, figures.rounding) and tested != better.refuted:
+    tested = {n for n, each in enumerate(borne) if each is not None}
+    if better.after.worse(better.before, figures.rounding) and not tested <= {*better.refuted}:
         borne_out = better.findings.selection.selected
         others = [n for n, selected in enumerate(borne_out) if selected.confirmed]
         worse = better.before, better.after
-        better = _refuting(better, better.findings, others)._replace(refuted=tested, worse=worse)
+        gone = tuple(sorted(tested | {*better.refuted}))
+        better = _refuting(better, better.findings, others)._replace(refuted=gone, worse=worse)
         better = measured(better, figures)
     if better.findings.selection.selected and better.after.worse(better.before, figures.rounding):
         better = measured(_without_leaning(_without_nil(_at_base_values(better))), figures)
@@ -126,11 +129,11 @@ def _without_leaning(better: Improved) -> Improved:
 
 def _by_chance(findings: Findings) -> list[int]:
     """Numbers of the changes at a moment that take no more of what is left without them than the
-    draws did of what they were found in.
+    draws did of what they were found in; pushes are not tested by draws.
     """
     left, numbers = findings.undelayed.selection.last.energy, list[int]()
     for number, selected in enumerate(findings.selection.selected):
-        if selected.effect.momentary:
+        if selected.effect.momentary and selected.trial.threshold < np.inf:
             without = findings.without(number).undelayed.selection.last.energy
             if not 1 - left / without > selected.trial.threshold:
                 numbers.append(number)

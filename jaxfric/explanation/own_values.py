@@ -6,7 +6,7 @@ from ..data.excerpt import MOST
 from . import parameters as spelled
 from .baseline import Baseline, at_values
 from .common_factor import put_right, with_factor
-from .earlier import changed, new
+from .earlier import changed, without_unchanged
 from .findings import Findings
 from .holdout import measured
 from .improvement import Improved, improved, without_unsure
@@ -22,7 +22,7 @@ def judged(
 ) -> tuple[Mismatch | None, Improved]:
     """The baseline's wrong values beside the findings, and which of both make the model better."""
     doing("testing the baseline's values")
-    findings = new(known, findings)
+    findings = without_unchanged(known, findings)
     wrong = _wrong(known, findings, seed)
     searched_for = findings.selection.remaining.trials and not findings.selection.selected
     if wrong is not None and searched_for:

@@ -8,8 +8,8 @@ from typing import Any
 from ..checks import NO_STRIBECK, is_bump, passive
 from ..data import summary
 from ..data.printable import printable
-from ..looks import unseen
 from ..looks.text import Block, Table, aligned, text, wrapped
+from ..looks.unseen import slower
 from ..models import NAMED
 from .constant_load import NAME as LOAD
 
@@ -312,11 +312,11 @@ def _places(document: Mapping[str, Any]) -> list[Block]:
         name = place["coordinate"].replace("_", " ")
         share, chance = f"{place['share']:.0%}", f"{place['p_value']:.3f}"
         where.append([name, share, chance, place["detail"]])
-    hidden = [[unseen.WHAT, unseen.SIZE, ""]]
+    hidden = [["not found, would have been seen from", "rms in slip", ""]]
     for entry in document["not_visible"]:
         name = entry["effect"].replace("_", " ")
         hidden.append([f"  {name}", f"{entry['smallest_detectable']:.3g}", entry["unit"]])
     tables = [Table(where, (1, 2)), Table(hidden, (1,))]
     blocks: list[Block] = [table for table in tables if len(table.rows) > 1]
-    note = unseen.slower(document)
+    note = slower(document)
     return [*blocks, [note]] if note else blocks

@@ -3,10 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-WHAT = "not found, would have been seen from"
-# As a size is given: the same cogging has √2 times that for its amplitude.
-SIZE = "rms in slip"
-
 
 def slower(document: Mapping[str, Any]) -> str:
     """That nothing is said of friction at low speed; empty where something is."""
